@@ -1,7 +1,8 @@
-//! The online algorithm on measured insertions: it detects the puncture of the skin, and nothing in air.
+//! Promise: on measured insertions the core detects the puncture of the skin at the force drop, and nothing
+//! in air.
 //!
-//! The recordings have no licence and stay outside the repository. They are read from the folder
-//! named by `STYLET_MEASURED`; without it these tests report that they were skipped.
+//! The recordings have no licence and stay outside the repository, in the folder that `STYLET_MEASURED`
+//! names; without it these tests are skipped.
 
 mod support;
 
@@ -14,10 +15,8 @@ const MAP: &str = r#"Columns(
     force: (name: "fz", scale: 1.0),
 )"#;
 
-const TESTS: usize = 2;
-
 fn measured(test: &str) -> Option<PathBuf> {
-    support::measured::measured(test, "needle_phantom", TESTS).map(|folder| folder.join("needle_phantom"))
+    support::measured::measured(test, "needle_phantom").map(|folder| folder.join("needle_phantom"))
 }
 
 fn enhance(scratch: &Scratch, data: &std::path::Path) -> serde_json::Value {
@@ -32,10 +31,10 @@ fn enhance(scratch: &Scratch, data: &std::path::Path) -> serde_json::Value {
 }
 
 #[test]
-fn the_skins_puncture_is_found_in_every_measured_run() {
-    let Some(folder) = measured("the_skins_puncture_is_found_in_every_measured_run") else { return };
+fn the_skin_puncture_is_found_in_every_recording() {
+    let Some(folder) = measured("the_skin_puncture_is_found_in_every_recording") else { return };
     let scratch = Scratch::new("measured");
-    let mut runs = 0;
+    let mut recordings = 0;
     for speed in 1..=3 {
         for run in 1..=5 {
             let result = enhance(&scratch, &folder.join(format!("skin-on-muscle_{speed}mmps_run{run}.csv")));
@@ -44,10 +43,10 @@ fn the_skins_puncture_is_found_in_every_measured_run() {
             println!("{speed} mm/s run {run}: ruptures at {depths:.4?} m");
             assert!(depths.iter().any(|z| (0.012..0.020).contains(z)), "{speed} mm/s run {run}: {depths:?}");
             assert!(depths.len() <= 4, "{speed} mm/s run {run}: {depths:?}");
-            runs += 1;
+            recordings += 1;
         }
     }
-    assert_eq!(runs, 15);
+    assert_eq!(recordings, 15);
 }
 
 #[test]

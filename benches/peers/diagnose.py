@@ -2,7 +2,7 @@
 
     python diagnose.py TUNING_TERMS TUNING_TRUTH TEST_TERMS ANSWERS
 
-The folders of terms hold what `cargo run --release -p stylet-diagnose --example peers_terms` wrote for two challenges. Every peer sees
+The folders of terms hold what `cargo run --release -p stylet-diagnose --example regression_tables` wrote for two challenges. Every peer sees
 the residual of the fitted base law, what the parameters of the base law change (projected out), and what every effect of the library adds to
 the force at the values from which Stylet's own search begins.
 

@@ -19,7 +19,7 @@ export RAYON_NUM_THREADS=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 python=${STYLET_PEERS_PYTHON:-target/peers/bin/python}
 "$python" -c 'import pysindy, sklearn, sysidentpy' || { echo "no peers: run bash benches/peers/setup.sh first" >&2; exit 2; }
 cargo build --release --quiet
-cargo build --release --quiet -p stylet-diagnose --example peers_terms
+cargo build --release --quiet -p stylet-diagnose --example regression_tables
 cargo build --release --quiet -p stylet-examine --example truth
 stylet=target/release/stylet
 
@@ -27,7 +27,7 @@ given() { # world, cases, seed -> the challenge, exported and with its terms
     local of=target/peers_cases/$1-$2-$3
     [ -d "$of" ] || "$stylet" benchmark export --world "$1" --misspecification nothing,thickness --severity large \
         --hide one,one,two,outside,clean --cases "$((($2 + 1) / 2))" --seed "$3" --out "$of" >&2
-    target/release/examples/peers_terms "$of" "$of.terms" >&2
+    target/release/examples/regression_tables "$of" "$of.terms" >&2
     echo "$of"
 }
 

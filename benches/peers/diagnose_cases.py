@@ -1,4 +1,4 @@
-"""The cases of a challenge as `peers_terms` wrote them, the problem a regression is given, its answer, and what an answer is worth
+"""The cases of a challenge as `regression_tables` wrote them, the problem a regression is given, its answer, and what an answer is worth
 while a peer is tuned (as the benchmark scores: `crates/examine/src/judge/answers.rs`)."""
 
 import json

@@ -1,11 +1,13 @@
-//! Real sets with an instrument that is wrong: eight faults put into measured recordings, checks in air and under load included.
+//! Measured sets with instrument faults: writes copies of the recordings with eight faults, reference
+//! recordings included.
 //!
 //! ```sh
 //! STYLET_MEASURED=folder cargo run --release -p stylet-diagnose --example instrument_faults -- out
 //! STYLET_MEASURED=out/gain stylet diagnose scenarios/measured/skin.ron
 //! ```
-//! Reads `needle_phantom/*.csv` (columns `time` in microseconds, `fz` in N) and writes `out/<fault>/needle_phantom/*.csv`. What it
-//! writes is derived from the recordings and belongs wherever they do.
+//!
+//! Reads `needle_phantom/*.csv` (columns `time` in microseconds, `fz` in N) and writes
+//! `out/<fault>/needle_phantom/*.csv`. The output is derived from the recordings and has their licence.
 
 use std::error::Error;
 use std::fmt::Write as _;
@@ -68,7 +70,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A recording with its force changed.
+/// The file with its force column changed.
 fn with(file: &Path, fault: Fault) -> Result<String, Box<dyn Error>> {
     let text = std::fs::read_to_string(file)?;
     let mut lines = text.lines();

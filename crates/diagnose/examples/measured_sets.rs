@@ -1,14 +1,16 @@
-//! Sets of measured insertions on the one engine: what `docs/measured.md` says of it.
+//! Tables of `docs/measured.md` for the measured sets.
 //!
 //! ```sh
 //! STYLET_MEASURED=folder cargo run --release -p stylet-diagnose --example measured_sets
 //! ```
-//! Files are `needle_phantom/{skin-on-muscle,skin,muscle}_*.csv` in that folder; names after `--` choose some of the three, `shifted` adds
-//! the stack with the runs of its second speed moved by 1.5 mm. Prints tables and what one fit costs, writes nothing.
+//!
+//! Files are `needle_phantom/{skin-on-muscle,skin,muscle}_*.csv`; arguments select sets, `shifted` adds the
+//! stack with the recordings of its second speed moved by 1.5 mm. Prints tables and the processor time of
+//! one fit, writes nothing.
 
-mod guess;
+mod assumed_tissue;
 
-use guess::believed;
+use assumed_tissue::assumed_tissue;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -16,13 +18,13 @@ use stylet_diagnose::repeated_insertions::cross_validation::{
     PHASE_NAMES, PredictionScore, leave_one_out_scores, leave_speed_out, repeatability_floor,
 };
 use stylet_diagnose::repeated_insertions::multistart_fit::{draw_starts, multistart_fit};
-use stylet_diagnose::repeated_insertions::{SegmentedRecording, model_selection, start_values};
+use stylet_diagnose::repeated_insertions::{SegmentedRecording, segmented_recording, stick_slip_fit};
 use stylet_record::sensor_artefacts::SensorArtefacts;
 use stylet_record::{ColumnMap, ReadOptions, read_csv_skip_nonfinite};
 
-/// Seed of what they begin with.
+/// Seed of the start values.
 const SEED: u64 = 15;
-/// By how much the runs of one speed are moved, in m.
+/// Shift of the recordings of one speed in m.
 const SHIFT_M: f64 = 1.5e-3;
 /// Columns of the recordings.
 const COLUMNS: &str =
@@ -38,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     {
         if chosen.iter().any(|c| c == name) || (chosen.is_empty() && name != "shifted") {
             let files = if name == "shifted" { "skin-on-muscle" } else { name };
-            study(name, &read(&folder, files, layers)?, layers, shift_m)?;
+            print_set(name, &read(&folder, files, layers)?, layers, shift_m)?;
         }
     }
     Ok(())
@@ -59,7 +61,7 @@ fn read(folder: &Path, name: &str, layers: usize) -> Result<Vec<SegmentedRecordi
     Ok(out)
 }
 
-/// Processor time (s) of all threads of this process so far: what other load on the machine does not count in.
+/// Processor time (s) of all threads of this process so far, independent of other load.
 fn cpu_s() -> f64 {
     use nix::sys::resource::{UsageWho, getrusage};
     getrusage(UsageWho::RUSAGE_SELF).map_or(f64::NAN, |usage| {
@@ -68,9 +70,14 @@ fn cpu_s() -> f64 {
     })
 }
 
-fn study(name: &str, all: &[SegmentedRecording], layers: usize, shift_m: f64) -> Result<(), Box<dyn Error>> {
+fn print_set(
+    name: &str,
+    all: &[SegmentedRecording],
+    layers: usize,
+    shift_m: f64,
+) -> Result<(), Box<dyn Error>> {
     let plain: Vec<&SegmentedRecording> = all.iter().collect();
-    let groups = start_values::group_by_speed_and_stroke(&plain);
+    let groups = segmented_recording::group_by_speed_and_stroke(&plain);
     let moved: Vec<SegmentedRecording> = all
         .iter()
         .enumerate()
@@ -82,42 +89,37 @@ fn study(name: &str, all: &[SegmentedRecording], layers: usize, shift_m: f64) ->
             SegmentedRecording::new(run.name.clone(), recording, layers)
         })
         .collect();
-    let runs: Vec<&SegmentedRecording> = moved.iter().collect();
-    println!("\n# {name}: {} runs", runs.len());
-    let begin = draw_starts(&believed(layers), &runs, 1, &mut ChaCha8Rng::seed_from_u64(SEED));
+    let recordings: Vec<&SegmentedRecording> = moved.iter().collect();
+    println!("\n# {name}: {} recordings", recordings.len());
+    let starts = draw_starts(&assumed_tissue(layers), &recordings, 1, &mut ChaCha8Rng::seed_from_u64(SEED));
     let before = cpu_s();
-    let one = multistart_fit(&begin, &runs, &SensorArtefacts::default());
+    let one = multistart_fit(&starts, &recordings, &SensorArtefacts::default());
     println!(
-        "one fit, from its first look to the last: {:.1} s of processor time, {:.3} N left",
+        "one multi-start fit: {:.1} s of processor time, RMS residual {:.3} N",
         cpu_s() - before,
         one.first().map_or(f64::NAN, |f| f.rms_n())
     );
-    let law = model_selection::fit_stick_slip(
-        &believed(layers),
-        &runs,
+    let stick_slip = stick_slip_fit::fit_stick_slip(
+        &assumed_tissue(layers),
+        &recordings,
         &SensorArtefacts::default(),
         &mut ChaCha8Rng::seed_from_u64(SEED),
     );
-    let fit = law.ok_or("no law could be fitted")?.set_fit;
-    println!("left by the fit {:.3} N; {} of {} starts agree", fit.rms_n(), fit.starts.1, fit.starts.0);
+    let fit = stick_slip.ok_or("no model could be fitted")?.set_fit;
+    println!("RMS residual {:.3} N; {} of {} starts agree", fit.rms_n(), fit.starts.1, fit.starts.0);
     let model = &fit.fit.model;
     println!("surface {:.2} mm", 1e3 * model.tissue.surface_m);
-    for (layer, choice) in model.tissue.layers.iter().zip(0..) {
-        println!(
-            "layer {}: {:.1} mm, {:.0} N/m",
-            choice + 1,
-            1e3 * layer.thickness_m,
-            layer.stiffness_n_per_m
-        );
+    for (layer, term) in model.tissue.layers.iter().zip(0..) {
+        println!("layer {}: {:.1} mm, {:.0} N/m", term + 1, 1e3 * layer.thickness_m, layer.stiffness_n_per_m);
     }
-    for choice in &model.effects {
+    for term in &model.effects {
         let numbers =
-            choice.info.parameters.iter().zip(&choice.values).map(|(p, v)| format!("{} {v:.4}", p.path));
-        println!("{}: {}", choice.info.id, numbers.collect::<Vec<_>>().join(", "));
+            term.info.parameters.iter().zip(&term.values).map(|(p, v)| format!("{} {v:.4}", p.path));
+        println!("{}: {}", term.info.id, numbers.collect::<Vec<_>>().join(", "));
     }
     let s = &model.scatter;
     println!(
-        "between runs: surface {:.2} mm, friction {:.1} %, puncture {:.1} %; between days: surface {:.2} mm, friction {:.1} %",
+        "between recordings: surface {:.2} mm, friction {:.1} %, puncture {:.1} %; between days: surface {:.2} mm, friction {:.1} %",
         1e3 * s.surface_m,
         1e2 * s.ln_friction,
         1e2 * s.rupture_force,
@@ -125,16 +127,19 @@ fn study(name: &str, all: &[SegmentedRecording], layers: usize, shift_m: f64) ->
         1e2 * s.day_ln_friction
     );
     for (day, g) in model.days.iter().zip(&groups) {
-        let speed = 1e3 * runs[g[0]].speed_mps;
+        let speed = 1e3 * recordings[g[0]].speed_mps;
         println!(
             "day of {speed:.2} mm/s: surface {:+.2} mm, friction {:+.3}",
             1e3 * day.surface_m,
             day.ln_friction
         );
     }
-    let (floors, one, day) =
-        (repeatability_floor(&runs), leave_one_out_scores(&fit, &runs), leave_speed_out(&fit, &runs));
-    println!("| mm/s | floor | floor, not inflated | left out | in band | speed left out | in band |");
+    let (floors, one, day) = (
+        repeatability_floor(&recordings),
+        leave_one_out_scores(&fit, &recordings),
+        leave_speed_out(&fit, &recordings),
+    );
+    println!("| mm/s | floor | unbiased floor | held out | coverage | speed held out | coverage |");
     let mean = |g: &[usize], f: &dyn Fn(usize) -> Option<f64>| {
         let known: Vec<f64> = g.iter().filter_map(|i| f(*i)).collect();
         if known.is_empty() {
@@ -157,10 +162,10 @@ fn study(name: &str, all: &[SegmentedRecording], layers: usize, shift_m: f64) ->
         );
     };
     for g in &groups {
-        line(format!("{:.2}", 1e3 * runs[g[0]].speed_mps), g);
+        line(format!("{:.2}", 1e3 * recordings[g[0]].speed_mps), g);
     }
-    line("all".to_owned(), &(0..runs.len()).collect::<Vec<_>>());
-    println!("| part | floor | left out | of the floor |");
+    line("all".to_owned(), &(0..recordings.len()).collect::<Vec<_>>());
+    println!("| phase | floor | held out | ratio to the floor |");
     let pooled = |scores: &mut dyn Iterator<Item = &PredictionScore>, k: usize| {
         let (sum, n) =
             scores.fold((0.0, 0.0), |(s, n), x| (s + x.phase_squares[k].0, n + x.phase_squares[k].1));

@@ -2,8 +2,8 @@
 
 use crate::repeated_insertions::SegmentedRecording;
 use crate::repeated_insertions::cross_validation::PredictionScore;
-use crate::repeated_insertions::model_selection::{ModelFamily, ScoredModel};
 use crate::repeated_insertions::multistart_fit::{SetFit, fit_from};
+use crate::repeated_insertions::scored_model::{ModelFamily, ScoredModel};
 use crate::selection_state::{Search, SearchStage};
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};

@@ -9,13 +9,12 @@
 //! ```
 //! What is known about a case (its effect and parameters) is asserted in addition.
 
-mod drawn;
-mod recorded;
+mod answer_file;
 
+use answer_file::AnswerLines;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use recorded::AnswerLines;
 use stylet_diagnose::diagnosis_json::Cause;
 use stylet_diagnose::prediction::{Refit, predict};
 use stylet_diagnose::{DiagnosisResult, NamedRecording, Options, Verdict, diagnose};

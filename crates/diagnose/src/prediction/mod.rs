@@ -1,7 +1,7 @@
-//! A model against recordings that took no part in making it: the next day, another needle.
+//! Prediction of recordings that were not used for the model: another day, another needle.
 //!
-//! The law ruptures its layers by itself. What the model leaves is set beside the noise, and the share of the recorded
-//! force inside a 90 % band beside 90 %: a model that is right for these recordings has both.
+//! The model computes its ruptures from its own puncture forces (free run). A correct model has residuals
+//! at the noise level and a 90 % band that contains 90 % of the measured force.
 
 mod prediction_band;
 mod surface_friction_refit;
@@ -11,57 +11,55 @@ use crate::diagnosis_json::Diagnosis;
 use crate::error::DiagnoseError;
 use crate::held_out::predict_free_run;
 use crate::input_checks::{NamedRecording, clean_recordings};
+pub use prediction_band::BAND_LEVEL;
 use prediction_band::{Band, Uncertainty};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
-use stylet_identify::likelihood::{FitData, replay};
+use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{Model, NO_RUPTURE};
 use stylet_identify::noise::Noise;
 use stylet_scenario::Scenario;
 pub use surface_friction_refit::Refit;
 
-/// Share of the recorded force that a right band holds.
-pub const BAND_LEVEL: f64 = 0.9;
-
-/// How one recording is predicted.
+/// Prediction of one recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecordingPrediction {
-    /// Recording.
+    /// Name.
     pub name: String,
-    /// Root mean square of measured less predicted force in N; a rupture may be early or late by two samples.
+    /// RMS error in N; ruptures may differ by two samples.
     pub rmse_n: f64,
-    /// The same of the believed scenario, if one was given.
+    /// RMS error of the assumed scenario in N, if given.
     pub assumed_rmse_n: Option<f64>,
-    /// Share of the recorded force (means over 20 ms) inside the 90 % band, 0 to 1.
+    /// Share of the measured force (means over 20 ms) inside the 90 % band, 0 to 1.
     pub band_coverage: f64,
-    /// Largest force measured less largest force predicted, in N.
+    /// Largest measured minus largest predicted force, in N.
     pub peak_error_n: f64,
-    /// Position of the surface beyond the model's, in m, where it was re-fitted.
+    /// Surface relative to the model's in m, if it was refitted.
     pub surface_shift_m: Option<f64>,
-    /// Friction over the model's, where it was re-fitted.
+    /// Friction relative to the model's, if it was refitted.
     pub friction_factor: Option<f64>,
 }
 
-/// How well a model predicts: `predict.json`.
+/// Prediction of all recordings: `predict.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Prediction {
-    /// Each recording.
+    /// Per recording.
     pub recordings: Vec<RecordingPrediction>,
-    /// Root mean square over all in N.
+    /// RMS error over all recordings in N.
     pub rmse_n: f64,
-    /// The same of the believed scenario.
+    /// RMS error of the assumed scenario in N.
     pub assumed_rmse_n: Option<f64>,
-    /// Standard deviation of the sensor's noise in N: no model can be better.
+    /// Standard deviation of the sensor noise in N: lower limit of the error.
     pub floor_n: f64,
-    /// Share of the recorded force inside the 90 % band, 0 to 1.
+    /// Share of the measured force inside the 90 % band, 0 to 1.
     pub band_coverage: f64,
-    /// What the band holds: noise, scatter from insertion to insertion, intervals of the numbers.
+    /// Components of the band: noise, scatter between recordings, parameter intervals.
     pub band_includes: Vec<String>,
-    /// Numbers re-fitted, and whether each recording was predicted by those of the others.
+    /// Refitted parameters.
     pub refitted: Vec<Refit>,
-    /// Whether no number was fitted to the recording that it predicts.
+    /// Whether no parameter was fitted to the recording that it predicts.
     pub held_out: bool,
 }
 
@@ -76,37 +74,39 @@ pub struct PredictionCurves {
     pub measured_n: Vec<f64>,
     /// Predicted force in N.
     pub predicted_n: Vec<f64>,
-    /// What the believed scenario predicts, in N.
+    /// Force predicted by the assumed scenario in N.
     pub assumed_n: Option<Vec<f64>>,
     /// Lower edge of the band in N.
     pub low_n: Vec<f64>,
-    /// Upper edge.
+    /// Upper edge in N.
     pub high_n: Vec<f64>,
-    /// Whether the block was compared.
+    /// Whether the block is compared.
     pub used: Vec<bool>,
-    /// Instants in s at which the law ruptures its layers.
+    /// Rupture times of the model in s.
     pub ruptures_s: Vec<f64>,
 }
 
-/// A prediction with what its report draws.
+/// A prediction with the curves of its report.
 #[derive(Clone, Debug)]
 pub struct PredictionResult {
-    /// What is said.
+    /// Summary.
     pub prediction: Prediction,
     /// Curves of every recording.
     pub curves: Vec<PredictionCurves>,
 }
 
-/// Predicts recordings by a scenario. `diagnosis` is the one that the scenario came from, if there is one: it tells noise,
-/// scatter and intervals. `believed` is what was believed before it. What is in `refit` is fitted to the recordings first;
-/// with two or more of them each is predicted by what the others say.
+/// Predicts recordings with a scenario. `diagnosis` is the one that the scenario came from, if any: it
+/// gives noise, scatter and intervals. `assumed` is the scenario before the diagnosis. Parameters in
+/// `refit` are fitted to the recordings first; with two or more of them, each is predicted with the values
+/// of the others.
 ///
 /// # Errors
+///
 /// [`DiagnoseError`] when the recordings do not fit the scenario.
 pub fn predict(
     scenario: &Scenario,
     diagnosis: Option<&Diagnosis>,
-    believed: Option<&Scenario>,
+    assumed: Option<&Scenario>,
     refit: &[Refit],
     evidence: &[NamedRecording],
 ) -> Result<PredictionResult, DiagnoseError> {
@@ -122,17 +122,17 @@ pub fn predict(
     let n = blocks.len();
     let data = FitData::new(Arc::new(blocks), Noise::white(known.block_n), 0.0);
     let mut model = Model::base(Arc::new(assumptions_of(scenario)), n);
-    let own =
+    let offsets =
         surface_friction_refit::fit_recording_offsets(&model, &data, refit).ok_or(DiagnoseError::NoFit)?;
     let held_out = refit.is_empty() || n > 1;
-    model.per_recording = (0..n).map(|r| surface_friction_refit::held_out_mean(&own, r)).collect();
-    let before = believed.map(|b| Model::base(Arc::new(assumptions_of(b)), n));
+    model.per_recording = (0..n).map(|r| surface_friction_refit::held_out_mean(&offsets, r)).collect();
+    let before = assumed.map(|b| Model::base(Arc::new(assumptions_of(b)), n));
     let band = Band { known: &known, model: &model, data: &data };
-    let each: Vec<Option<(RecordingPrediction, PredictionCurves, Square)>> = (0..n)
+    let each: Vec<Option<(RecordingPrediction, PredictionCurves, ErrorSums)>> = (0..n)
         .into_par_iter()
-        .map(|r| one(&model, before.as_ref(), &band, refit, &data, r, &evidence[r].name))
+        .map(|r| predict_one(&model, before.as_ref(), &band, refit, &data, r, &evidence[r].name))
         .collect();
-    let mut foretold = PredictionResult {
+    let mut result = PredictionResult {
         prediction: Prediction {
             recordings: Vec::with_capacity(n),
             rmse_n: 0.0,
@@ -145,29 +145,29 @@ pub fn predict(
         },
         curves: Vec::with_capacity(n),
     };
-    let mut all = Square::default();
+    let mut all = ErrorSums::default();
     for found in each {
-        let (predicted, shown, square) = found.ok_or(DiagnoseError::NoFit)?;
+        let (predicted, curves, square) = found.ok_or(DiagnoseError::NoFit)?;
         all.add(&square);
-        foretold.prediction.recordings.push(predicted);
-        foretold.curves.push(shown);
+        result.prediction.recordings.push(predicted);
+        result.curves.push(curves);
     }
-    foretold.prediction.rmse_n = (all.after / all.blocks.max(1.0)).sqrt();
-    foretold.prediction.assumed_rmse_n = believed.map(|_| (all.before / all.blocks.max(1.0)).sqrt());
-    foretold.prediction.band_coverage = all.inside / all.blocks.max(1.0);
-    Ok(foretold)
+    result.prediction.rmse_n = (all.after / all.blocks.max(1.0)).sqrt();
+    result.prediction.assumed_rmse_n = assumed.map(|_| (all.before / all.blocks.max(1.0)).sqrt());
+    result.prediction.band_coverage = all.inside / all.blocks.max(1.0);
+    Ok(result)
 }
 
-/// Sums over blocks compared.
+/// Sums over compared blocks.
 #[derive(Clone, Copy, Debug, Default)]
-struct Square {
+struct ErrorSums {
     blocks: f64,
     after: f64,
     before: f64,
     inside: f64,
 }
 
-impl Square {
+impl ErrorSums {
     fn add(&mut self, other: &Self) {
         self.blocks += other.blocks;
         self.after += other.after;
@@ -176,7 +176,7 @@ impl Square {
     }
 }
 
-fn one(
+fn predict_one(
     model: &Model,
     before: Option<&Model>,
     band: &Band,
@@ -184,7 +184,7 @@ fn one(
     data: &FitData,
     r: usize,
     name: &str,
-) -> Option<(RecordingPrediction, PredictionCurves, Square)> {
+) -> Option<(RecordingPrediction, PredictionCurves, ErrorSums)> {
     let b = &data.recordings[r];
     let left = predict_free_run(model, data, r)?;
     let was = match before {
@@ -196,9 +196,9 @@ fn one(
     let (low_n, high_n) = band.edges(r);
     let within =
         (0..b.len()).filter(|k| b.used[*k] && (low_n[*k]..=high_n[*k]).contains(&b.force_n[*k])).count();
-    let own = model.per_recording[r];
+    let offsets = model.per_recording[r];
     let square = |mean_n2: f64| (mean_n2 + b.within_block_sd_n().powi(2)) * left.compared_blocks as f64;
-    let sums = Square {
+    let sums = ErrorSums {
         blocks: left.compared_blocks as f64,
         after: square(left.mean_square_n2),
         before: was.as_ref().map_or(0.0, |w| square(w.mean_square_n2)),
@@ -214,10 +214,10 @@ fn one(
         assumed_rmse_n: was.as_ref().map(|_| (sums.before / count).sqrt()),
         band_coverage: sums.inside / count,
         peak_error_n: peak(&b.force_n) - peak(&predicted_n),
-        surface_shift_m: refit.contains(&Refit::Surface).then_some(own.surface_m),
-        friction_factor: refit.contains(&Refit::Friction).then(|| libm::exp(own.ln_friction)),
+        surface_shift_m: refit.contains(&Refit::Surface).then_some(offsets.surface_m),
+        friction_factor: refit.contains(&Refit::Friction).then(|| libm::exp(offsets.ln_friction)),
     };
-    let shown = PredictionCurves {
+    let curves = PredictionCurves {
         position_m: time_s.iter().map(|t| b.motion.at(*t).0).collect(),
         time_s,
         measured_n: b.force_n.clone(),
@@ -228,13 +228,5 @@ fn one(
         used: b.used.clone(),
         ruptures_s: left.rupture_times_s.iter().copied().filter(|t| *t < NO_RUPTURE).collect(),
     };
-    Some((predicted, shown, sums))
-}
-
-/// The force (N) of a model over one recording with the law's own ruptures.
-fn by_itself(model: &Model, data: &FitData, r: usize) -> Option<Vec<f64>> {
-    let trail = stylet_identify::likelihood::ReplayCache::new(model, data, r)?;
-    let mut at = model.clone();
-    at.rupture_times_s[r] = trail.free_rupture_times();
-    Some(replay(&at, data, r)?.force_n)
+    Some((predicted, curves, sums))
 }

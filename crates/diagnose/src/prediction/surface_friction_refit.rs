@@ -1,4 +1,4 @@
-//! Numbers that another needle or another day may change, fitted to the new recordings while all others stand.
+//! Refit of surface and friction to new recordings, all other parameters fixed.
 
 use crate::base_law_fit::roughness;
 use serde::{Deserialize, Serialize};
@@ -9,24 +9,24 @@ use stylet_identify::model::{Assumptions, FreeParameters, Model, RecordingParame
 use stylet_identify::rupture_assignment::assign_ruptures;
 use stylet_identify::update_event_times::update_event_times;
 
-/// A number that may be fitted again.
+/// A parameter that may be refitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Refit {
-    /// The position of the surface.
+    /// Position of the surface.
     Surface,
     /// Friction: one factor for all layers.
     Friction,
 }
 
-/// How far the numbers that stand may move, relative: not at all, to what a fit resolves.
-const PINNED: f64 = 1e-7;
-/// Standard deviation of what a surface may be away before the recordings are seen, in m.
-const WIDE_M: f64 = 5e-3;
-/// The same of friction's logarithm.
-const WIDE: f64 = 0.7;
+/// Relative tolerance of fixed parameters.
+const FIXED_TOLERANCE: f64 = 1e-7;
+/// Prior standard deviation of the surface in m.
+const SURFACE_PRIOR_SD_M: f64 = 5e-3;
+/// Prior standard deviation of the logarithm of friction.
+const FRICTION_PRIOR_SD: f64 = 0.7;
 
-/// What each recording says of the numbers that may be fitted again.
+/// Random effects of every recording.
 pub fn fit_recording_offsets(
     model: &Model,
     data: &FitData,
@@ -37,7 +37,7 @@ pub fn fit_recording_offsets(
     }
     let layers = model.layers();
     let belief = Assumptions {
-        tolerance: vec![PINNED; layers],
+        tolerance: vec![FIXED_TOLERANCE; layers],
         thickness_tolerance: vec![0.0; layers],
         surface_tolerance_m: 0.0,
         ..Assumptions::clone(&model.assumed)
@@ -48,7 +48,7 @@ pub fn fit_recording_offsets(
         recording_friction: refit.contains(&Refit::Friction),
         ..FreeParameters::default()
     };
-    (model.scatter.surface_m, model.scatter.ln_friction) = (WIDE_M, WIDE);
+    (model.scatter.surface_m, model.scatter.ln_friction) = (SURFACE_PRIOR_SD_M, FRICTION_PRIOR_SD);
     let noise_n = roughness(&data.recordings);
     let found: Vec<_> = data.recordings.iter().map(detect_force_drops).collect();
     model.rupture_times_s = assign_ruptures(&model, &data.recordings, &found, 0.5, noise_n);
@@ -59,7 +59,7 @@ pub fn fit_recording_offsets(
     Some(fit(&model, data, Effort::FULL)?.model.per_recording)
 }
 
-/// What a recording is predicted by: the mean of what the others say; what it says itself if it is alone.
+/// Values for predicting recording `r`: mean of the other recordings, or its own if it is alone.
 pub fn held_out_mean(own: &[RecordingParameters], r: usize) -> RecordingParameters {
     let others = own.iter().enumerate().filter(|(k, _)| own.len() == 1 || *k != r).map(|(_, o)| o);
     let (mut sum, mut n) = (RecordingParameters::default(), 0.0);
@@ -81,7 +81,7 @@ mod tests {
     use stylet_identify::model::RecordingParameters;
 
     #[test]
-    fn a_recording_is_lent_the_mean_of_the_others_and_its_own_when_it_is_alone() {
+    fn a_recording_uses_the_mean_of_the_others_or_its_own_if_alone() {
         let own = |surface_m: f64, friction: f64| RecordingParameters {
             surface_m,
             ln_friction: friction,

@@ -1,29 +1,29 @@
-//! The mean insertion of a set as a scenario that can be simulated.
+//! The mean insertion of repeated recordings as a scenario that can be simulated.
 
-use crate::repeated_insertions::instrument_faults::InstrumentReport;
-use crate::repeated_insertions::start_values::SegmentedRecording;
+use super::instrument_faults::InstrumentReport;
+use super::segmented_recording::SegmentedRecording;
 use stylet_identify::model::{EffectTerm, Model};
 use stylet_scenario::{ForceTorque, Motion, Robot, Scenario, Segment, Sensor};
 
-/// Shortest hold of the scenario in s.
-const LEAST_HOLD_S: f64 = 0.1;
-/// Noise of the sensor in N where no recording in air tells it.
-const UNTOLD_NOISE_N: f64 = 0.01;
+/// Shortest hold (s).
+const MIN_HOLD_S: f64 = 0.1;
+/// Sensor noise (N) without a recording in air.
+const DEFAULT_NOISE_N: f64 = 0.01;
 
-/// The law with the mean of what varies, moved as the middle run was.
+/// The model at the mean of its random effects with the motion of the middle recording.
 #[must_use]
 pub fn mean_scenario(
     name: &str,
     model: &Model,
-    runs: &[&SegmentedRecording],
+    recordings: &[&SegmentedRecording],
     instrument: &InstrumentReport,
 ) -> Scenario {
-    let run = runs[runs.len() / 2];
+    let run = recordings[recordings.len() / 2];
     let r = &run.recording;
     let (start, deepest) = (r.position_m[0], r.position_m[run.phases.deepest]);
     let speed = run.speed_mps.max(1e-5);
     let t = |i: usize| r.time_s.get(i).copied().unwrap_or(r.time_s[r.len() - 1]);
-    let hold = (t(run.phases.retraction) - t(run.phases.deepest)).max(LEAST_HOLD_S);
+    let hold = (t(run.phases.retraction) - t(run.phases.deepest)).max(MIN_HOLD_S);
     let mut segments = vec![
         Segment::Move { velocity_mps: speed, duration_s: (deepest - start) / speed },
         Segment::Hold { duration_s: hold },
@@ -32,8 +32,8 @@ pub fn mean_scenario(
         segments.push(Segment::Move { velocity_mps: -speed, duration_s: (deepest - start) / speed });
     }
     Scenario {
-        name: format!("{name}, as measured: the mean insertion"),
-        source: "fitted to measured insertions by stylet diagnose".to_owned(),
+        name: format!("{name}: mean insertion"),
+        source: "fitted to measured recordings by stylet diagnose".to_owned(),
         tissue: model.tissue.clone(),
         effects: model
             .effects
@@ -44,7 +44,7 @@ pub fn mean_scenario(
         motion: Motion::Program { start_m: start, segments },
         robot: Robot::Replay,
         sensor: Sensor::ForceTorque(ForceTorque {
-            noise_n: instrument.noise_n.unwrap_or(UNTOLD_NOISE_N),
+            noise_n: instrument.noise_n.unwrap_or(DEFAULT_NOISE_N),
             ar1: instrument.ar1.unwrap_or(0.0).clamp(-0.99, 0.99),
             ..ForceTorque::default()
         }),
@@ -71,7 +71,7 @@ mod tests {
     use stylet_scenario::{Motion, Segment, Sensor};
     use stylet_tissue::{CoulombFriction, Effect};
 
-    /// From 3 mm on in at a speed for 4 s, a rest, and back or not.
+    /// Advance from 3 mm for 4 s, hold, and retraction if `back`.
     fn run(speed: f64, rest_s: f64, back: bool) -> SegmentedRecording {
         let n = ((4.0 + rest_s + if back { 4.0 } else { 0.0 }) * 50.0) as usize;
         let t: Vec<f64> = (0..n).map(|k| 0.02 * k as f64).collect();
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_insertion_moves_as_the_middle_run_did() {
+    fn the_mean_insertion_has_the_motion_of_the_middle_recording() {
         let belief = assumed_layers(&[[0.05, 100.0, 1000.0]]);
         let mut model = Model::base(belief, 3);
         model.effects = vec![EffectTerm::new(CoulombFriction { c_n_per_m: 3.0 }.info(), &[3.0])];
@@ -114,10 +114,10 @@ mod tests {
         assert_eq!(segments.as_slice(), wanted);
         assert!((b.speed_mps - 0.004).abs() < 1e-6 && (way - 0.016).abs() < 2e-4);
         assert_eq!(s.effects.len(), 1);
-        assert_eq!(s.name, "gel, as measured: the mean insertion");
+        assert_eq!(s.name, "gel: mean insertion");
         let Sensor::ForceTorque(f) = &s.sensor else { unreachable!("a force sensor") };
         assert_eq!((f.noise_n, f.ar1), (0.03, 0.99));
-        // A run that never comes back: it rests until its end, a tenth of a second at least.
+        // Without a retraction: hold until the end, at least 0.1 s.
         let s = mean_scenario(
             "gel",
             &model,

@@ -1,25 +1,33 @@
-//! Sets of repeated insertions on the one engine: what varies between recordings and days is random, the law is shared.
+//! Diagnosis of repeated insertions into the same tissue: the model is common to all recordings, surface,
+//! friction, puncture forces and selected effect parameters vary between recordings and days.
 //!
-//! | module | what lives there |
+//! In the order of the data:
+//!
+//! | module | purpose |
 //! |---|---|
-//! | [`dataset`] | the description of a set, its files |
-//! | [`first`] | the first guess: what the raw force says of faces, loads and releases |
-//! | [`fitted`] | the fit from several starts, judged by the law's own discrepancy |
-//! | [`laws`] | the base law, what the library adds, a shaft that slips: which predicts recordings left out |
-//! | [`population`] | an insertion nobody has seen: draws from what varies, mean and band |
-//! | [`nested`](mod@nested) | parts of the set predicted by laws that were chosen without them |
-//! | [`alike`](mod@alike) | what runs of one speed leave alike, learned beside the law |
-//! | [`left_out`] | recordings and whole days left out; the mean of the others as the floor; by phase |
-//! | [`instrument`] | what a motion in air and a known load show of the instrument, and what they exclude |
-//! | [`compose`] | layers measured alone, put together |
-//! | [`study`](mod@study) | all of it; [`numbers`], [`repeats`](mod@repeats) and [`scenario`] say it |
-//! | [`specimens`] | many specimens, each indented once and held |
+//! | [`dataset`] | description of a data set and its files |
+//! | [`segmented_recording`], [`insertion_phase`] | recordings with phases and events, grouped by speed and stroke |
+//! | [`instrument_faults`] | detection and correction of sensor and drive faults |
+//! | [`start_values`], [`multistart_fit`], [`stick_slip_fit`] | priors, start values and fits |
+//! | [`random_effects_population`], [`population_prediction`] | random effects, and predicted force with its band |
+//! | [`empirical_discrepancy`] | correction of a prediction by the residuals of other recordings |
+//! | [`cross_validation`], [`nested_cross_validation`] | held-out errors and the repeatability floor |
+//! | [`scored_model`], [`held_out_loss`], [`ablation`], [`model_selection`] | comparison of models and of their terms |
+//! | [`parameter_estimates`] | estimates with jackknife intervals |
+//! | [`diagnose_set`](mod@diagnose_set) | the whole diagnosis |
+//! | [`repeatability_report`](mod@repeatability_report), [`data_quality_notes`], [`mean_scenario`](mod@mean_scenario) | its results |
+//! | [`layer_composition`] | stack of layers measured alone |
+//! | [`indentation_relaxation`] | specimens indented once and held |
 
+pub mod ablation;
 pub mod cross_validation;
+pub mod data_quality_notes;
 pub mod dataset;
 pub mod diagnose_set;
 pub mod empirical_discrepancy;
+pub mod held_out_loss;
 pub mod indentation_relaxation;
+pub mod insertion_phase;
 pub mod instrument_faults;
 pub mod layer_composition;
 pub mod mean_scenario;
@@ -28,7 +36,11 @@ pub mod multistart_fit;
 pub mod nested_cross_validation;
 pub mod parameter_estimates;
 pub mod population_prediction;
+pub mod random_effects_population;
 pub mod repeatability_report;
+pub mod scored_model;
+pub mod segmented_recording;
 pub mod start_values;
+pub mod stick_slip_fit;
 
-pub use start_values::SegmentedRecording;
+pub use segmented_recording::SegmentedRecording;

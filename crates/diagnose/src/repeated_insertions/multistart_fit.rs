@@ -1,8 +1,9 @@
-//! The fit of a set from several starts: the objective has many optima, and one start in three finds the best.
+//! Multi-start fit of repeated recordings. The objective has many local optima; about one start in three
+//! reaches the best.
 
-use crate::repeated_insertions::start_values::{
-    EXPECTED_DAY_FRICTION_SD, EXPECTED_DAY_SURFACE_SD_M, SLIP_RATE_INDEX, SPEED_TOLERANCE,
-    SegmentedRecording, StartValues, shaft_slip_start,
+use super::segmented_recording::{SPEED_TOLERANCE, SegmentedRecording};
+use super::start_values::{
+    EXPECTED_DAY_FRICTION_SD, EXPECTED_DAY_SURFACE_SD_M, SLIP_RATE_INDEX, StartValues, shaft_slip_start,
 };
 use rand::{RngExt, rngs::ChaCha8Rng};
 use rayon::prelude::*;
@@ -17,50 +18,50 @@ use stylet_identify::update_event_times::update_event_times;
 use stylet_record::sensor_artefacts::SensorArtefacts;
 use stylet_tissue::{AnyEffect, Effect, Tissue};
 
-/// Length of the blocks of a set in s: insertions repeat no better.
+/// Block length (s) of repeated recordings: insertions do not repeat more finely.
 pub const SET_BLOCK_S: f64 = 0.08;
-/// Starts look at blocks so many times as long.
-const COARSE: usize = 3;
-/// The first fits see misfits of this share of the largest force as noise.
-const FIRST_SHARE: f64 = 0.1;
-/// The spread between days that is expected counts as that of so many days.
+/// Blocks of the first fits are longer by this factor.
+const COARSENING_FACTOR: usize = 3;
+/// Initial noise as a share of the largest force.
+const INITIAL_NOISE_SHARE: f64 = 0.1;
+/// Weight, in days, of the expected scatter between days.
 pub(super) const PRIOR_DAYS: f64 = 4.0;
-/// Turns of the fits of a first look, and of those that go on;
-const FIRST_LOOK: [usize; 2] = [6, 6];
-/// the latter start from numbers that stand.
-const LONG_LOOK: [usize; 2] = [6, 8];
-/// So many starts go on.
-const GO_ON: usize = 8;
-/// So many fits that differ by more than a share are looked at closely,
-const FEW_FITS: usize = 4;
-/// that share,
-const SAME: f64 = 0.002;
-/// if they leave less than so many times what the best one leaves.
-const WITHIN: f64 = 1.4;
-/// Fits agree when their errors differ by less than this share.
-const AGREE: f64 = 0.03;
+/// Iterations of the screening fits, per noise update.
+const SCREENING_TURNS: [usize; 2] = [6, 6];
+/// Iterations of the fits that continue, per noise update.
+const CONTINUED_TURNS: [usize; 2] = [6, 8];
+/// Number of starts that continue after screening.
+const CONTINUED_STARTS: usize = 8;
+/// Largest number of distinct optima that are refined.
+const MAX_OPTIMA: usize = 4;
+/// Optima whose RMS residuals differ by less than this share are the same.
+const SAME_OPTIMUM: f64 = 0.002;
+/// Optima above this multiple of the best RMS residual are not refined.
+const MAX_RMS_RATIO: f64 = 1.4;
+/// Starts agree when their RMS residuals differ by less than this share.
+const AGREEMENT: f64 = 0.03;
 
-/// A set that is fitted.
+/// A fit of repeated recordings.
 #[derive(Clone, Debug)]
 pub struct SetFit {
     /// The fit.
     pub fit: Fit,
-    /// The recordings, and what is left as noise.
+    /// Recordings in blocks, with the estimated noise.
     pub data: FitData,
-    /// Instants (s) of the drops of every recording.
+    /// Times (s) of the force drops of every recording.
     pub drop_times_s: Vec<Vec<f64>>,
-    /// Starts, and how many of them came to the same error.
+    /// Number of starts, and how many reached the same RMS residual.
     pub starts: (usize, usize),
 }
 
 impl SetFit {
-    /// Root mean square in N of what the fit leaves with the ruptures where they were seen.
+    /// RMS residual (N) with the ruptures at the observed times.
     #[must_use]
     pub fn rms_n(&self) -> f64 {
         self.fit.rms_n(&self.data)
     }
 
-    /// The same recordings with another law, fitted from where it stands.
+    /// The same recordings fitted with another model, starting from its values.
     #[must_use]
     pub fn refit_with(&self, model: &Model) -> Option<Self> {
         let (fit, data) = fit_with_noise_updates(model, self.data.clone(), &self.drop_times_s, &[6])?;
@@ -68,37 +69,40 @@ impl SetFit {
     }
 }
 
-/// The recordings in blocks, without the samples that the raw force excludes.
+/// Recordings in blocks, without the samples that sensor artefacts exclude.
 #[must_use]
-pub fn set_blocks(runs: &[&SegmentedRecording], raw: &SensorArtefacts) -> Vec<BlockAverages> {
+pub fn set_blocks(recordings: &[&SegmentedRecording], artefacts: &SensorArtefacts) -> Vec<BlockAverages> {
     let none = Vec::new();
-    runs.par_iter()
+    recordings
+        .par_iter()
         .enumerate()
-        .map(|(r, run)| BlockAverages::new(&run.recording, raw.exclude.get(r).unwrap_or(&none), SET_BLOCK_S))
+        .map(|(r, run)| {
+            BlockAverages::new(&run.recording, artefacts.exclude.get(r).unwrap_or(&none), SET_BLOCK_S)
+        })
         .collect()
 }
 
-/// The first noise: misfits of a share of the largest force.
-fn unsettled(blocks: Vec<BlockAverages>) -> FitData {
+/// Blocks with the initial noise.
+fn with_initial_noise(blocks: Vec<BlockAverages>) -> FitData {
     let largest = blocks.iter().flat_map(|b| &b.abs_force_n).fold(1e-6_f64, |m, f| m.max(*f));
-    FitData::new(Arc::new(blocks), Noise::white(FIRST_SHARE * largest), 1e-3)
+    FitData::new(Arc::new(blocks), Noise::white(INITIAL_NOISE_SHARE * largest), 1e-3)
 }
 
-/// A model fitted to recordings from where it stands, by the set's own noise.
+/// Fits a model from its own values and estimates the noise.
 #[must_use]
 pub fn fit_from(model: &Model, blocks: Vec<BlockAverages>, drops: Vec<Vec<f64>>) -> Option<SetFit> {
-    let (fit, data) = fit_with_noise_updates(model, unsettled(blocks), &drops, &[6, 8])?;
+    let (fit, data) = fit_with_noise_updates(model, with_initial_noise(blocks), &drops, &[6, 8])?;
     Some(SetFit { fit, data, drop_times_s: drops, starts: (1, 1) })
 }
 
-/// What start `k` begins with: the first in the middle of what is thought possible, the others anywhere in it.
-fn guess(k: usize, rng: &mut ChaCha8Rng) -> StartValues {
+/// Start values number `k`: the middle of the range for 0, random in the range otherwise.
+fn start_values(k: usize, rng: &mut ChaCha8Rng) -> StartValues {
     let mut within = |(low, high): (f64, f64)| {
         let drawn = rng.random::<f64>();
         low + (high - low) * if k == 0 { 0.5 } else { drawn }
     };
     let mut times = |(low, high): (f64, f64)| libm::exp(within((libm::log(low), libm::log(high))));
-    let (exponent, fast, slow, waits) =
+    let (exponent, fast, slow, delay) =
         (times((4.0, 18.0)), times((0.03, 3.0)), times((4.0, 20.0)), times((6.0, 20.0)));
     StartValues {
         linear_share: within((0.1, 0.9)),
@@ -110,14 +114,14 @@ fn guess(k: usize, rng: &mut ChaCha8Rng) -> StartValues {
         rate: within((-0.3, 0.1)),
         fractions: [within((0.02, 0.4)), within((0.02, 0.4))],
         time_constants_s: [fast, slow],
-        delay_exponent: waits,
+        delay_exponent: delay,
         surface_m: within((-1.5e-3, 5e-4)),
-        // Deeper layers rupture where the force drops, or shortly behind their front without a drop of their own.
+        // Deeper layers rupture at the visible drop, or shortly behind their front without a drop.
         rupture_depth_m: Some(within((-4e-3, 6e-3))).filter(|m| *m > 0.0),
     }
 }
 
-/// Fits in rounds, the noise being what the round before has left.
+/// Fits in rounds; before each, noise, rupture times and scatter are updated from the previous one.
 #[must_use]
 pub fn fit_with_noise_updates(
     model: &Model,
@@ -129,7 +133,7 @@ pub fn fit_with_noise_updates(
     let mut best: Option<Fit> = None;
     for turns in rounds {
         let mut from = best.as_ref().map_or(model, |b| &b.model).clone();
-        across(&mut from, &data);
+        move_day_trend_to_rate(&mut from, &data);
         if let Some(best) = &best {
             data = data.with_noise(discrepancy_noise(
                 &data.recordings,
@@ -137,7 +141,7 @@ pub fn fit_with_noise_updates(
                 data.floor_n,
             ));
             update_event_times(&mut from, &data, drops);
-            spreads(&mut from, &data, best);
+            update_scatter(&mut from, &data, best);
         }
         best = Some(fit_nonsmooth(&from, &data, Effort { max_iterations: *turns, min_gain_nats: 0.05 })?);
     }
@@ -146,21 +150,22 @@ pub fn fit_with_noise_updates(
     Some((best, data))
 }
 
-/// Logarithm of the speed (in mm/s) of an advance.
+/// Logarithm of the advance speed (mm/s).
 fn ln_speed(blocks: &BlockAverages) -> f64 {
     let fastest = blocks.pieces.iter().map(|p| p.velocity_mps).fold(0.0, f64::max);
     let advance = blocks.pieces.iter().map(|p| p.velocity_mps).filter(|v| *v > 0.5 * fastest);
     libm::log(1e3 * stylet_stats::median_of(advance))
 }
 
-/// Gives what friction does from day to day along the logarithm of their speeds to the rate of the hold: that is the same force with days
-/// that differ least, and a fit hardly moves along such a valley.
-fn across(model: &mut Model, data: &FitData) {
+/// Moves the part of the day effects on friction that is linear in the logarithm of speed into the rate
+/// exponent. Both give the same force; the second has the smaller day effects, and a fit hardly moves along
+/// this valley.
+fn move_day_trend_to_rate(model: &mut Model, data: &FitData) {
     let held = |e: usize| {
         model.tied.iter().any(|b| (b.effect, b.parameter, b.tied_to) == (e, SLIP_RATE_INDEX, None))
     };
-    let slips = |e: &usize| matches!(model.effects[*e].effect(), Some(AnyEffect::ShaftSlip(_)));
-    let which: Vec<usize> = (0..model.effects.len()).filter(slips).collect();
+    let is_slip = |e: &usize| matches!(model.effects[*e].effect(), Some(AnyEffect::ShaftSlip(_)));
+    let which: Vec<usize> = (0..model.effects.len()).filter(is_slip).collect();
     let speed =
         |day| model.day_of.iter().position(|d| *d == day).and_then(|r| data.recordings.get(r)).map(ln_speed);
     let days: Vec<(usize, f64)> =
@@ -181,20 +186,21 @@ fn across(model: &mut Model, data: &FitData) {
     let level = y - slope * x;
     days.iter().for_each(|(d, s)| model.days[*d].ln_friction -= level + slope * s);
     for e in which {
-        let choice = &model.effects[e];
-        if let Some(AnyEffect::ShaftSlip(mut s)) = choice.effect() {
+        let term = &model.effects[e];
+        if let Some(AnyEffect::ShaftSlip(mut s)) = term.effect() {
             s.scale_friction(libm::exp(level));
             s.rate += slope;
-            model.effects[e] = EffectTerm::new(choice.info, &AnyEffect::from(s).parameters());
+            model.effects[e] = EffectTerm::new(term.info, &AnyEffect::from(s).parameters());
         }
     }
 }
 
-/// Spreads between recordings and between days as a fit tells them: the mean square of the numbers and of what the data leave open
-/// of them (expectation maximisation with the fit's own curvature), so that a number nobody can see keeps the spread that it had.
-fn spreads(model: &mut Model, data: &FitData, at: &Fit) {
+/// Updates the scatter between recordings and between days: mean square of the estimates plus their
+/// conditional variance (expectation maximisation with the curvature of the fit). A parameter without
+/// information keeps its scatter.
+fn update_scatter(model: &mut Model, data: &FitData, at: &Fit) {
     let tangent = Linearization::new(&at.model, data, &at.residuals);
-    let (recordings, own) = (data.recording_count(), tangent.per_recording.len());
+    let (count, random_effects) = (data.recording_count(), tangent.per_recording.len());
     let conditional = |places: &[usize]| -> Vec<f64> {
         let factor = tangent.normal_matrix.submatrix(places).cholesky();
         (0..places.len())
@@ -204,10 +210,10 @@ fn spreads(model: &mut Model, data: &FitData, at: &Fit) {
             })
             .collect()
     };
-    let mut sums = vec![(0.0, 0.0); own];
-    for r in 0..recordings {
-        // An instant that never was moves nothing.
-        let moves: Vec<usize> = (0..own)
+    let mut sums = vec![(0.0, 0.0); random_effects];
+    for r in 0..count {
+        // A random effect without information is skipped.
+        let moves: Vec<usize> = (0..random_effects)
             .filter(|o| tangent.normal_matrix.at(tangent.index_of(*o, r), tangent.index_of(*o, r)) > 0.0)
             .collect();
         let places: Vec<usize> = moves.iter().map(|o| tangent.index_of(*o, r)).collect();
@@ -236,7 +242,7 @@ fn spreads(model: &mut Model, data: &FitData, at: &Fit) {
         days[kind].0 += model.get(n.role, 0).powi(2) + conditional(&[i])[0];
         days[kind].1 += 1.0;
     }
-    // Few days tell little of their spread: what is expected of it counts as much as some more days.
+    // Few days determine their scatter poorly: the expected value counts as `PRIOR_DAYS` more days.
     let spread = |(sum, n): (f64, f64), expected: f64| {
         ((sum + PRIOR_DAYS * expected * expected) / (n + PRIOR_DAYS)).sqrt()
     };
@@ -244,8 +250,8 @@ fn spreads(model: &mut Model, data: &FitData, at: &Fit) {
     model.scatter.day_ln_friction = spread(days[1], EXPECTED_DAY_FRICTION_SD);
 }
 
-/// Fits from every start, those that leave least first.
-fn from_all(models: &[Model], data: &FitData, drops: &[Vec<f64>], rounds: &[usize]) -> Vec<(f64, Model)> {
+/// Fits from every start, smallest RMS residual first.
+fn fit_all(models: &[Model], data: &FitData, drops: &[Vec<f64>], rounds: &[usize]) -> Vec<(f64, Model)> {
     let one = |model: &Model| {
         let (fit, data) = fit_with_noise_updates(model, data.clone(), drops, rounds)?;
         Some((fit.rms_n(&data), fit.model))
@@ -255,48 +261,53 @@ fn from_all(models: &[Model], data: &FitData, drops: &[Vec<f64>], rounds: &[usiz
     found
 }
 
-/// Of fits that leave so much, the smallest first: how many agree with the best one, and which few differ and are looked at closely.
-fn apart(errors: &[f64]) -> (usize, Vec<usize>) {
+/// Given RMS residuals in ascending order: how many agree with the best, and the indices of the distinct
+/// optima to refine.
+fn distinct_optima(errors: &[f64]) -> (usize, Vec<usize>) {
     let best = errors.first().copied().unwrap_or(f64::NAN);
-    let agree = errors.iter().filter(|e| **e < best * (1.0 + AGREE)).count();
+    let agree = errors.iter().filter(|e| **e < best * (1.0 + AGREEMENT)).count();
     let mut apart: Vec<usize> = Vec::new();
-    for (k, e) in errors.iter().enumerate().filter(|(_, e)| **e < best * WITHIN) {
-        if apart.len() < FEW_FITS && apart.iter().all(|f| *e > errors[*f] * (1.0 + SAME)) {
+    for (k, e) in errors.iter().enumerate().filter(|(_, e)| **e < best * MAX_RMS_RATIO) {
+        if apart.len() < MAX_OPTIMA && apart.iter().all(|f| *e > errors[*f] * (1.0 + SAME_OPTIMUM)) {
             apart.push(k);
         }
     }
     (agree, apart)
 }
 
-/// Where `starts` fits of a set begin; `rng` draws it.
+/// Start models of a multi-start fit; `rng` draws the start values.
 #[must_use]
 pub fn draw_starts(
-    believed: &Tissue,
-    runs: &[&SegmentedRecording],
+    assumed: &Tissue,
+    recordings: &[&SegmentedRecording],
     starts: usize,
     rng: &mut ChaCha8Rng,
 ) -> Vec<Model> {
-    (0..starts.max(1)).map(|k| shaft_slip_start(believed, runs, &guess(k, rng))).collect()
+    (0..starts.max(1)).map(|k| shaft_slip_start(assumed, recordings, &start_values(k, rng))).collect()
 }
 
-/// Fits of a set from where they begin: the best few that differ, those that leave least first.
+/// Multi-start fit: the distinct best optima, smallest RMS residual first.
 ///
-/// What leaves least need not predict best: which of them stands is for recordings left out to say. Deterministic for any number of
-/// threads.
+/// The smallest residual need not predict best; the caller compares held-out errors. Deterministic for any
+/// number of threads.
 #[must_use]
-pub fn multistart_fit(began: &[Model], runs: &[&SegmentedRecording], raw: &SensorArtefacts) -> Vec<SetFit> {
-    let fine = set_blocks(runs, raw);
+pub fn multistart_fit(
+    starts: &[Model],
+    recordings: &[&SegmentedRecording],
+    artefacts: &SensorArtefacts,
+) -> Vec<SetFit> {
+    let fine = set_blocks(recordings, artefacts);
     let drops: Vec<Vec<f64>> =
-        runs.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect()).collect();
-    let coarse = unsettled(fine.iter().map(|b| b.coarsened(COARSE)).collect());
-    // Most starts are given up after a look; those that promise most go on.
-    let mut found = from_all(began, &coarse, &drops, &FIRST_LOOK);
-    found.truncate(GO_ON);
+        recordings.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect()).collect();
+    let coarse = with_initial_noise(fine.iter().map(|b| b.coarsened(COARSENING_FACTOR)).collect());
+    // Most starts are dropped after screening.
+    let mut found = fit_all(starts, &coarse, &drops, &SCREENING_TURNS);
+    found.truncate(CONTINUED_STARTS);
     let promising: Vec<Model> = found.into_iter().map(|f| f.1).collect();
-    let found = from_all(&promising, &coarse, &drops, &LONG_LOOK);
+    let found = fit_all(&promising, &coarse, &drops, &CONTINUED_TURNS);
     let errors: Vec<f64> = found.iter().map(|f| f.0).collect();
-    let (agree, apart) = apart(&errors);
-    let whole = unsettled(fine);
+    let (agree, apart) = distinct_optima(&errors);
+    let whole = with_initial_noise(fine);
     let mut out: Vec<SetFit> = apart
         .par_iter()
         .filter_map(|k| {
@@ -310,260 +321,4 @@ pub fn multistart_fit(began: &[Model], runs: &[&SegmentedRecording], raw: &Senso
 }
 
 #[cfg(test)]
-mod tests {
-    use super::{
-        AGREE, SAME, SET_BLOCK_S, SLIP_RATE_INDEX, StartValues, WITHIN, across, apart, fit_from,
-        fit_with_noise_updates, guess, set_blocks, spreads, unsettled,
-    };
-    use crate::repeated_insertions::SegmentedRecording;
-    use crate::test_fixtures::{
-        SENSOR_NOISE_SD_N, assumed_layers, fit_from_truth, gel_tissue, simulated_recordings,
-    };
-    use rand::{SeedableRng, rngs::ChaCha8Rng};
-    use std::sync::Arc;
-    use stylet_identify::fit::{Fit, Linearization};
-    use stylet_identify::likelihood::{FitData, residuals};
-    use stylet_identify::model::{DayParameters, EffectTerm, Model, ParameterRole, TiedParameter};
-    use stylet_identify::noise::Noise;
-    use stylet_record::sensor_artefacts::SensorArtefacts;
-    use stylet_tissue::{AnyEffect, Effect, ReleaseDepth, ShaftSlip};
-
-    /// What a start begins with, each as its place between the ends of what is thought possible: none at the lower one, 1 at the upper.
-    fn places(g: &StartValues) -> Vec<f64> {
-        let even = |x: f64, low: f64, high: f64| (x - low) / (high - low);
-        let by_factors = |x: f64, low: f64, high: f64| (x / low).ln() / (high / low).ln();
-        vec![
-            even(g.linear_share, 0.1, 0.9),
-            even(g.hold_ratio, 0.3, 0.9),
-            even(g.pull_ratio, 0.3, 0.9),
-            even(g.kept_share, 0.4, 1.0),
-            by_factors(g.exponent, 4.0, 18.0),
-            even(g.wear_per_m[0], 0.0, 80.0),
-            even(g.wear_per_m[1], 0.0, 120.0),
-            even(g.rate, -0.3, 0.1),
-            even(g.fractions[0], 0.02, 0.4),
-            even(g.fractions[1], 0.02, 0.4),
-            by_factors(g.time_constants_s[0], 0.03, 3.0),
-            by_factors(g.time_constants_s[1], 4.0, 20.0),
-            by_factors(g.delay_exponent, 6.0, 20.0),
-            even(g.surface_m, -1.5e-3, 5e-4),
-        ]
-    }
-
-    #[test]
-    fn the_first_start_begins_in_the_middle_of_what_is_thought_possible_and_the_others_anywhere_in_it() {
-        let mut rng = ChaCha8Rng::seed_from_u64(4);
-        let first = guess(0, &mut rng);
-        assert!(places(&first).iter().all(|x| (x - 0.5).abs() < 1e-12), "{:?}", places(&first));
-        assert!((first.rupture_depth_m.expect("behind its front") - 1e-3).abs() < 1e-15);
-        let all: Vec<StartValues> = (1..=1500).map(|k| guess(k, &mut rng)).collect();
-        for place in 0..14 {
-            let mut x: Vec<f64> = all.iter().map(|g| places(g)[place]).collect();
-            x.sort_by(f64::total_cmp);
-            assert!(x[0] >= 0.0 && x[0] < 0.01 && x[1499] <= 1.0 && x[1499] > 0.99, "{place}");
-            assert!((x[750] - 0.5).abs() < 0.05, "{place}: {}", x[750]);
-        }
-        // Six of ten give way behind their front, the others where the force drops.
-        let behind: Vec<f64> = all.iter().filter_map(|g| g.rupture_depth_m).collect();
-        assert!((behind.len() as f64 / 1500.0 - 0.6).abs() < 0.05, "{}", behind.len());
-        assert!(behind.iter().all(|m| *m > 0.0 && *m <= 6e-3) && stylet_stats::mean(&behind) > 2.7e-3);
-    }
-
-    #[test]
-    fn blocks_of_a_set_are_eight_hundredths_of_a_second_long_and_leave_out_what_the_raw_force_excludes() {
-        let all = simulated_recordings(&[], &[[0.004, 0.0], [0.004, 0.0]]);
-        let runs: Vec<&SegmentedRecording> = all.iter().collect();
-        let n = all[0].recording.len();
-        let exclude = vec![(0..n).map(|k| (100..150).contains(&k)).collect()];
-        let told = set_blocks(&runs, &SensorArtefacts { exclude, ..SensorArtefacts::default() });
-        assert_eq!(told.len(), 2);
-        assert!((told[0].end_s[7] - told[0].start_s[7] - SET_BLOCK_S).abs() < 1e-9);
-        let left_out = |b: &stylet_identify::block_averages::BlockAverages| {
-            (0..b.len()).filter(|k| !b.used[*k]).map(|k| b.end_s[k] - b.start_s[k]).sum::<f64>()
-        };
-        // A second, but for the blocks at its ends; of the other recording nothing is excluded.
-        let more = left_out(&told[0]) - left_out(&told[1]);
-        assert!((more - 1.0).abs() < 0.17, "{} {}", left_out(&told[0]), left_out(&told[1]));
-        // The first noise is a tenth of the largest force.
-        let largest = told.iter().flat_map(|b| &b.abs_force_n).fold(0.0_f64, |m, x| m.max(*x));
-        assert!((unsettled(told).noise.sd_n() / (0.1 * largest) - 1.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_set_settles_at_its_law_and_at_the_noise_that_it_has() {
-        let all = simulated_recordings(&[], &[[0.004, 3e-4], [0.004, -2e-4], [0.008, 1e-4], [0.008, -2e-4]]);
-        let runs: Vec<&SegmentedRecording> = all.iter().collect();
-        let told = fit_from_truth(&[], &runs);
-        let layer = &told.fit.model.tissue.layers[0];
-        let gel = &gel_tissue().layers[0];
-        assert!((layer.stiffness_n_per_m / gel.stiffness_n_per_m - 1.0).abs() < 0.02, "{layer:?}");
-        assert!((layer.friction_ns_per_m2 / gel.friction_ns_per_m2 - 1.0).abs() < 0.02, "{layer:?}");
-        // Four samples are averaged in a block.
-        let block_n = SENSOR_NOISE_SD_N / 2.0;
-        assert!((told.rms_n() / block_n - 1.0).abs() < 0.1, "{}", told.rms_n());
-        let sd_n = told.data.noise.sd_n();
-        assert!((sd_n / block_n - 1.0).abs() < 0.1, "{sd_n}");
-        assert_eq!(told.starts, (1, 1));
-        // Where the surfaces of the runs lie apart they are told apart, and so is how much.
-        let moved: Vec<f64> = told.fit.model.per_recording.iter().map(|o| o.surface_m).collect();
-        for (own, wanted) in moved.iter().zip([3e-4, -2e-4, 1e-4, -2e-4]) {
-            assert!((own - wanted).abs() < 2e-5, "{moved:?}");
-        }
-        let spread = told.fit.model.scatter.surface_m;
-        assert!((spread - 2.1e-4).abs() < 3e-5, "{spread}");
-        // Another law goes on from there; without a round there is no fit.
-        let stiff = told.refit_with(&told.fit.model).expect("a fit");
-        assert!((stiff.rms_n() / told.rms_n() - 1.0).abs() < 0.01 && stiff.drop_times_s == told.drop_times_s);
-        assert!(
-            fit_with_noise_updates(&told.fit.model, told.data.clone(), &told.drop_times_s, &[]).is_none()
-        );
-        let again = fit_from(&told.fit.model, told.data.recordings.to_vec(), told.drop_times_s.clone())
-            .expect("a fit");
-        assert!((again.rms_n() / told.rms_n() - 1.0).abs() < 0.01);
-    }
-
-    /// A model with numbers of each recording's own, where it stands in recordings that it did not make.
-    fn standing(noise_n: f64, change: impl Fn(&mut Model)) -> (Fit, FitData) {
-        let all = simulated_recordings(&[], &[[0.004, 0.0], [0.008, 0.0], [0.008, 0.0]]);
-        let runs: Vec<&SegmentedRecording> = all.iter().collect();
-        let data = FitData::new(
-            Arc::new(set_blocks(&runs, &SensorArtefacts::default())),
-            Noise::white(noise_n),
-            0.0,
-        );
-        let mut model = Model::base(assumed_layers(&[[0.05, 250.0, 2e4]]), 3);
-        change(&mut model);
-        let residuals = residuals(&model, &data).expect("a replay");
-        (Fit { model, residuals }, data)
-    }
-
-    fn near(told: f64, wanted: f64) {
-        assert!((told / wanted - 1.0).abs() < 1e-4, "{told} for {wanted}");
-    }
-
-    /// Expectation maximisation: the mean of the squares and of the variances that the data leave of them, here by the inverse of two by two.
-    #[test]
-    fn a_spread_between_recordings_is_that_of_their_numbers_and_of_what_the_data_leave_open() {
-        for noise_n in [0.01, 3.0] {
-            let (at, data) = standing(noise_n, |m| {
-                (m.free.recording_surface, m.free.recording_friction) = (true, true);
-                for (own, x) in m.per_recording.iter_mut().zip([[3e-4, -0.02], [-5e-4, 0.07], [1e-4, 0.03]]) {
-                    [own.surface_m, own.ln_friction] = x;
-                }
-            });
-            let tangent = Linearization::new(&at.model, &data, &at.residuals);
-            let (mut surface, mut friction) = (0.0, 0.0);
-            for r in 0..3 {
-                let (i, j) = (tangent.index_of(0, r), tangent.index_of(1, r));
-                let (a, b, c) = (
-                    tangent.normal_matrix.at(i, i),
-                    tangent.normal_matrix.at(j, i),
-                    tangent.normal_matrix.at(j, j),
-                );
-                let own = at.model.per_recording[r];
-                surface += own.surface_m.powi(2) + c / (a * c - b * b);
-                friction += own.ln_friction.powi(2) + a / (a * c - b * b);
-            }
-            let mut told = at.model.clone();
-            spreads(&mut told, &data, &at);
-            near(told.scatter.surface_m, (surface / 3.0).sqrt());
-            near(told.scatter.ln_friction, (friction / 3.0).sqrt());
-            assert_eq!(told.per_recording, at.model.per_recording);
-        }
-    }
-
-    #[test]
-    fn a_number_that_nobody_can_see_keeps_the_spread_that_it_had() {
-        // The tissue lies deeper than the needle goes.
-        let (at, data) = standing(0.01, |m| {
-            (m.free.recording_surface, m.free.recording_friction, m.free.recording_effects) =
-                (true, true, true);
-            m.tissue.surface_m = 0.1;
-            let release: AnyEffect = ReleaseDepth::default().into();
-            m.effects = vec![EffectTerm::new(release.info(), &release.parameters())];
-            (m.scatter.surface_m, m.scatter.ln_friction, m.scatter.varying[0]) = (7e-4, 0.03, 9e-4);
-        });
-        let mut told = at.model.clone();
-        (told.scatter.surface_m, told.scatter.ln_friction, told.scatter.varying[0]) = (1.0, 1.0, 1.0);
-        spreads(&mut told, &data, &at);
-        near(told.scatter.surface_m, 7e-4);
-        near(told.scatter.ln_friction, 0.03);
-        near(told.scatter.varying[0], 9e-4);
-    }
-
-    /// What is expected of days counts as four more of them.
-    #[test]
-    fn few_days_tell_a_spread_between_days_together_with_what_is_expected_of_it() {
-        let (at, data) = standing(0.5, |m| {
-            (m.free.day_surface, m.free.day_friction) = (true, true);
-            m.day_of = vec![0, 1, 1];
-            m.days = vec![
-                DayParameters { surface_m: 8e-4, ln_friction: -0.06 },
-                DayParameters { surface_m: -3e-4, ln_friction: 0.09 },
-            ];
-        });
-        let tangent = Linearization::new(&at.model, &data, &at.residuals);
-        let (mut surface, mut friction) = (4.0 * 3e-4 * 3e-4, 4.0 * 0.03 * 0.03);
-        for (i, n) in tangent.shared.iter().enumerate() {
-            let open = 1.0 / tangent.normal_matrix.at(i, i);
-            match n.role {
-                ParameterRole::DaySurface(d) => surface += at.model.days[d].surface_m.powi(2) + open,
-                ParameterRole::DayFriction(d) => friction += at.model.days[d].ln_friction.powi(2) + open,
-                _ => {}
-            }
-        }
-        let mut told = at.model.clone();
-        spreads(&mut told, &data, &at);
-        near(told.scatter.day_surface_m, (surface / 6.0).sqrt());
-        near(told.scatter.day_ln_friction, (friction / 6.0).sqrt());
-    }
-
-    /// Two speeds, each on a day of its own: days that differ as the speeds do say the same as a rate does.
-    #[test]
-    fn friction_that_goes_along_the_speeds_of_the_days_is_the_rates() {
-        let slip = ShaftSlip { push_n: 1.0, pull_n: 0.6, rate: 0.1, ..ShaftSlip::default() };
-        let friction = |m: &Model| m.days.iter().map(|d| d.ln_friction).collect::<Vec<_>>();
-        let (at, data) = standing(0.1, |m| {
-            let slip: AnyEffect = slip.clone().into();
-            m.effects = vec![EffectTerm::new(slip.info(), &slip.parameters())];
-            m.day_of = vec![0, 1, 1];
-            m.days = vec![
-                DayParameters { ln_friction: 0.2, ..DayParameters::default() },
-                DayParameters { ln_friction: -0.1, ..DayParameters::default() },
-            ];
-        });
-        let mut told = at.model.clone();
-        across(&mut told, &data);
-        // Speeds of 4 and 8 mm/s.
-        let slope = -0.3 / 2.0_f64.ln();
-        let level = 0.2 - slope * 4.0_f64.ln();
-        let [push, rate] = [1, SLIP_RATE_INDEX].map(|k| told.effects[0].values[k]);
-        assert!(
-            (rate - 0.1 - slope).abs() < 5e-3 && (push / level.exp() - 1.0).abs() < 1e-2,
-            "{push} {rate}"
-        );
-        assert!(friction(&told).iter().all(|f| f.abs() < 1e-12), "{:?}", told.days);
-        let same = residuals(&told, &data).expect("a replay");
-        let (a, b) = (same.residual_n.concat(), at.residuals.residual_n.concat());
-        assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 0.02));
-        // A rate that is held stays, and at one speed there is nothing to give.
-        let mut held = at.model.clone();
-        held.tied = vec![TiedParameter { effect: 0, parameter: SLIP_RATE_INDEX, tied_to: None }];
-        let mut one = at.model.clone();
-        one.day_of = vec![0, 0, 0];
-        for mut m in [held, one] {
-            let before = m.clone();
-            across(&mut m, &data);
-            assert_eq!((friction(&m), &m.effects[0].values), (friction(&before), &before.effects[0].values));
-        }
-    }
-
-    /// Three per cent for agreement, two thousandths for the same, two fifths for being looked at: just as much is too much, or too little.
-    #[test]
-    fn fits_agree_that_leave_about_the_same_and_the_best_few_that_differ_are_looked_at() {
-        assert_eq!(apart(&[2.0, 2.003, 2.005, 2.059, 2.07, 2.79, 2.81]), (4, vec![0, 2, 3, 4]));
-        assert_eq!(apart(&[2.0, 2.79, 2.81]), (1, vec![0, 1]));
-        assert_eq!(apart(&[2.0, 2.0 * (1.0 + SAME), 2.0 * (1.0 + AGREE), 2.0 * WITHIN]), (2, vec![0, 2]));
-        assert_eq!(apart(&[]), (0, vec![]));
-    }
-}
+mod tests;

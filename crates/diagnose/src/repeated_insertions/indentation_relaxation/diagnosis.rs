@@ -1,31 +1,31 @@
-//! What many indented specimens show, as a diagnosis.
+//! Diagnosis of many indented specimens.
 
-use super::{SpecimenReport, relaxing};
+use super::{SpecimenReport, relaxation};
 use crate::diagnosis_json::{
     Cause, DataQualityNote, Diagnosis, Estimate, Gain, NoiseReport, ResidualStructureReport, Verdict,
 };
-use crate::repeated_insertions::start_values::SegmentedRecording;
+use crate::repeated_insertions::segmented_recording::SegmentedRecording;
 use stylet_tissue::{AnyEffect, Effect, PowerLawFriction, RateDependentPuncture, ShaftSlip};
 
 impl SpecimenReport {
-    /// The effects of the rungs that are kept, each once.
+    /// Effects of the kept candidates, each once.
     pub fn kept_effects(&self) -> impl Iterator<Item = &str> {
-        let mut seen: Vec<&str> = Vec::new();
+        let mut ids: Vec<&str> = Vec::new();
         for effect in self.candidates.iter().filter(|r| r.kept).filter_map(|r| r.effect.as_deref()) {
-            if !seen.contains(&effect) {
-                seen.push(effect);
+            if !ids.contains(&effect) {
+                ids.push(effect);
             }
         }
-        seen.into_iter()
+        ids.into_iter()
     }
 
-    /// As a diagnosis.
+    /// Converts to a diagnosis.
     #[must_use]
-    pub fn diagnosis(&self, runs: &[SegmentedRecording]) -> Diagnosis {
+    pub fn diagnosis(&self, recordings: &[SegmentedRecording]) -> Diagnosis {
         let of = |effect: &str| {
             self.parameters
                 .iter()
-                .filter(|n| (effect == relaxing(&[]).info().id) == n.name.starts_with("terms."))
+                .filter(|n| (effect == relaxation(&[]).info().id) == n.name.starts_with("terms."))
                 .map(|n| (n.name.clone(), Estimate { value: n.mean, low: n.low, high: n.high }))
                 .collect()
         };
@@ -46,16 +46,16 @@ impl SpecimenReport {
             })
             .collect();
         let last = self.candidates.iter().rfind(|r| r.kept).map_or(0.0, |r| r.held_out_n);
-        let noise = stylet_stats::median_of(runs.iter().map(SegmentedRecording::noise_n));
+        let noise = stylet_stats::median_of(recordings.iter().map(SegmentedRecording::noise_n));
         Diagnosis {
             negligible: Vec::new(),
             verdict: if causes.is_empty() { Verdict::None } else { Verdict::Named },
             causes,
             base_parameters: Vec::new(),
-            not_identifiable: unseen(),
+            not_identifiable: unidentifiable_effects(),
             gain: Gain {
                 held_out: true,
-                recordings: runs.iter().map(|r| r.name.clone()).collect(),
+                recordings: recordings.iter().map(|r| r.name.clone()).collect(),
                 rmse_before_n: self.candidates.first().map_or(0.0, |r| r.held_out_n),
                 rmse_after_n: last,
                 floor_n: noise,
@@ -67,7 +67,7 @@ impl SpecimenReport {
                 nats: 0.0,
                 share: 0.0,
             },
-            data_quality: runs
+            data_quality: recordings
                 .iter()
                 .flat_map(|r| {
                     r.notes.iter().map(|n| DataQualityNote { recording: r.name.clone(), note: n.clone() })
@@ -77,14 +77,14 @@ impl SpecimenReport {
             noise: NoiseReport { sd_n: noise, ar: [0.0; 2], from_air: false },
             random_effect_sd: Default::default(),
             advice: vec![
-                "Nothing is retracted or punctured here: friction and puncture cannot be seen.".to_owned(),
+                "The recordings contain neither a retraction nor a puncture: friction and puncture are not identifiable.".to_owned(),
             ],
         }
     }
 }
 
-/// Effects that nothing shows where nothing is retracted or punctured.
-fn unseen() -> Vec<String> {
+/// Effects that need a retraction or a puncture.
+fn unidentifiable_effects() -> Vec<String> {
     let effects: [AnyEffect; 3] = [
         PowerLawFriction { exponent: 1.0 }.into(),
         ShaftSlip::default().into(),

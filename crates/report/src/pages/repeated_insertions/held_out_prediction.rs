@@ -5,7 +5,8 @@ use crate::page_model::{Cell, Section, Table};
 use crate::pages::formatting::three_decimals;
 use crate::palette::Colour;
 use stylet_diagnose::repeated_insertions::SegmentedRecording;
-use stylet_diagnose::repeated_insertions::diagnose_set::{SetDiagnosis, mean_speeds};
+use stylet_diagnose::repeated_insertions::diagnose_set::SetDiagnosis;
+use stylet_diagnose::repeated_insertions::segmented_recording::mean_speeds;
 use stylet_diagnose::report_curves::binned_means;
 use stylet_stats::number_format::p_value;
 

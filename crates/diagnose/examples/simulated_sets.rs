@@ -1,17 +1,19 @@
-//! Sets that the method was not made on: drawn from laws with other numbers, and from a reality of another form.
+//! Simulated sets with other parameters than the phantoms, and with another model.
 //!
 //! ```sh
-//! cargo run --release -p stylet-diagnose --example other_sets -- 12 1
+//! cargo run --release -p stylet-diagnose --example simulated_sets -- 12 1
 //! ```
-//! The words are how many sets and the seed of what is drawn; a third one studies that set alone. Even sets follow a shaft that slips, with numbers up to a factor of 2.5 from
-//! those of the phantoms; odd ones the referee's rich law (bristles, foundation springs, damage, tearing in steps). Five to fifteen
-//! runs at one to three speeds, each speed on a day of its own; one or two layers; strokes, rests and noise differ from set to set. Told
-//! is the error on runs left out over the floor, the mean of the other runs at the same speed: of the law, and of law and what it
-//! leaves alike.
+//!
+//! Arguments are the number of sets, the seed, and optionally the index of a single set. Even sets follow
+//! the stick-slip model with parameters up to a factor of 2.5 from those of the phantoms; odd ones the
+//! independent simulator (bristle friction, foundation springs, damage, tearing in steps). Five to fifteen
+//! recordings at one to three speeds, each speed on a day of its own; one or two layers; strokes, holds and
+//! noise differ between sets. Prints the held-out error over the repeatability floor, with and without the
+//! empirical discrepancy.
 
-mod guess;
+mod assumed_tissue;
 
-use guess::believed;
+use assumed_tissue::assumed_tissue;
 use rand::{RngExt, SeedableRng, rngs::ChaCha8Rng};
 use rand_distr::{Distribution, StandardNormal};
 use std::error::Error;
@@ -26,19 +28,19 @@ use stylet_examine::simulator::tissue as real;
 use stylet_record::Recording;
 use stylet_tissue::{AnyEffect, DelayedPuncture, ForceLaw, ForceLawState, ReleaseDepth, ShaftSlip};
 
-/// Numbers of a law lie up to this factor from those of the phantoms.
+/// Largest factor between a parameter and that of the phantoms.
 const FACTOR: f64 = 2.5;
-/// Samples a second.
+/// Sampling rate in Hz.
 const SAMPLE_HZ: f64 = 50.0;
-/// Longest step of the rich law (s).
+/// Largest step of the independent simulator (s).
 const STEP_S: f64 = 1e-3;
-/// Standard deviations from run to run, of the surface (m), friction and strength,
+/// Standard deviations between recordings: surface (m), friction, strength.
 const RUN: [f64; 3] = [2e-4, 0.04, 0.05];
-/// and from day to day, of the surface (m) and friction.
+/// Standard deviations between days: surface (m), friction.
 const DAY: [f64; 2] = [3e-4, 0.03];
-/// Slow noise that no law explains: its share of the largest force, and its correlation time (s).
+/// Correlated noise: share of the largest force, correlation time (s).
 const SLOW: (f64, f64) = (0.03, 0.5);
-/// Noise of the sensor (N).
+/// Sensor noise (N).
 const NOISE_N: f64 = 0.012;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -46,33 +48,33 @@ fn main() -> Result<(), Box<dyn Error>> {
     let sets: u64 = words.next().map_or(Ok(12), |w| w.parse())?;
     let seed: u64 = words.next().map_or(Ok(1), |w| w.parse())?;
     let only: Option<u64> = words.next().map(|w| w.parse()).transpose()?;
-    let (mut by_law, mut told) = (Vec::new(), Vec::new());
+    let (mut model_ratios, mut corrected_ratios) = (Vec::new(), Vec::new());
     for k in (0..sets).filter(|k| only.is_none_or(|only| *k == only)) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed * 1000 + k);
-        let (layers, runs) = set(k % 2 == 1, &mut rng)?;
-        let refs: Vec<&SegmentedRecording> = runs.iter().collect();
+        let (layers, recordings) = set(k % 2 == 1, &mut rng)?;
+        let refs: Vec<&SegmentedRecording> = recordings.iter().collect();
         let what = format!(
-            "{k}: {}, {layers} layer(s), {} runs at {:?} mm/s",
-            if k % 2 == 1 { "rich" } else { "slips" },
-            runs.len(),
-            stylet_diagnose::repeated_insertions::diagnose_set::mean_speeds(&refs)
+            "{k}: {}, {layers} layer(s), {} recordings at {:?} mm/s",
+            if k % 2 == 1 { "independent simulator" } else { "stick-slip" },
+            recordings.len(),
+            stylet_diagnose::repeated_insertions::segmented_recording::mean_speeds(&refs)
                 .iter()
                 .map(|s| (1e5 * s.0).round() / 100.0)
                 .collect::<Vec<_>>()
         );
         let Some(s) =
-            diagnose_set("other", &believed(layers), &refs, &ReferenceRecordings::default(), |_| {})
+            diagnose_set("other", &assumed_tissue(layers), &refs, &ReferenceRecordings::default(), |_| {})
         else {
-            println!("{what}: no law");
+            println!("{what}: no model");
             continue;
         };
         let m = &s.report.mean;
         let floor_n = m.floor_n.unwrap_or(f64::NAN);
-        by_law.push(m.model_n / floor_n);
-        told.push(m.with_discrepancy_n / floor_n);
+        model_ratios.push(m.model_n / floor_n);
+        corrected_ratios.push(m.with_discrepancy_n / floor_n);
         let names: Vec<&str> = s.diagnosis.causes.iter().map(|c| c.effect.as_str()).collect();
         println!(
-            "{what}: floor {floor_n:.3} N, law {:.2} of it, with what is alike {:.2}, in band {:.0} %; speed left out {:.3} N, in band {:.0} %; {:?} {}",
+            "{what}: floor {floor_n:.3} N, model {:.2} of it, with the empirical discrepancy {:.2}, coverage {:.0} %; speed held out {:.3} N, coverage {:.0} %; {:?} {}",
             m.model_n / floor_n,
             m.with_discrepancy_n / floor_n,
             100.0 * m.coverage,
@@ -82,7 +84,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             names.join(", ")
         );
     }
-    for (name, of) in [("law", &by_law), ("law and what is alike", &told)] {
+    for (name, of) in [("model", &model_ratios), ("with the empirical discrepancy", &corrected_ratios)] {
         let worst = of.iter().copied().fold(f64::NAN, f64::max);
         println!(
             "{name}: {:.2} of the floor in the median, {worst:.2} in the worst of {} sets",
@@ -93,7 +95,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// A motion: stroke (m), speed (m/s), rest (s).
+/// A motion.
 #[derive(Clone, Copy)]
 struct Motion {
     stroke_m: f64,
@@ -101,21 +103,21 @@ struct Motion {
     rest_s: f64,
 }
 
-/// What a run differs by: surface (m), logarithm of friction, strength.
+/// Random effects of a recording: surface (m), logarithm of friction, strength.
 type Differs = [f64; 3];
 
-/// The number of layers and the runs of a set.
+/// Number of layers and recordings of a set.
 fn set(rich: bool, rng: &mut ChaCha8Rng) -> Result<(usize, Vec<SegmentedRecording>), Box<dyn Error>> {
     let layers = 1 + usize::from(rng.random::<f64>() < 0.4);
     let speeds = 1 + (rng.random::<f64>() * 3.0) as usize;
     let each = (5 + (rng.random::<f64>() * 11.0) as usize).max(3 * speeds) / speeds;
     let slowest = 1e-3 * times(rng, 2.0);
     let (stroke_m, rest_s) = (0.02 + 0.015 * rng.random::<f64>(), 2.0 + 6.0 * rng.random::<f64>());
-    let slips: Vec<Vec<AnyEffect>> = (1..=layers).map(|l| slipping(l, rng)).collect();
-    let strange = ingredients(rng);
-    let strong = [2.0 * times(rng, FACTOR), 2.0 * times(rng, FACTOR)];
+    let stick_slip: Vec<Vec<AnyEffect>> = (1..=layers).map(|l| stick_slip_effects(l, rng)).collect();
+    let with = ingredients(rng);
+    let strength_n = [2.0 * times(rng, FACTOR), 2.0 * times(rng, FACTOR)];
     let thick_m = 0.011 * (0.8 + 0.4 * rng.random::<f64>());
-    let mut runs = Vec::new();
+    let mut recordings = Vec::new();
     for speed in 0..speeds {
         let motion = Motion { stroke_m, speed_mps: slowest * (1.0 + speed as f64), rest_s };
         let [day_m, day] = DAY.map(|sd| sd * normal(rng));
@@ -124,29 +126,29 @@ fn set(rich: bool, rng: &mut ChaCha8Rng) -> Result<(usize, Vec<SegmentedRecordin
             (surface_m, friction) = (surface_m + day_m, friction + day);
             let differs = [surface_m, friction, tough];
             let (time_s, position_m, mut force_n) = if rich {
-                rich_run(layers, thick_m, strong, &strange, motion, differs)
+                rich_run(layers, thick_m, strength_n, &with, motion, differs)
             } else {
-                slip_run(&slips, thick_m, motion, differs)?
+                slip_run(&stick_slip, thick_m, motion, differs)?
             };
             add_noise(&time_s, &mut force_n, rng);
             let recording = Recording::new(time_s, position_m, force_n)?;
-            runs.push(SegmentedRecording::new(format!("{speed} {k}"), recording, layers));
+            recordings.push(SegmentedRecording::new(format!("{speed} {k}"), recording, layers));
         }
     }
-    Ok((layers, runs))
+    Ok((layers, recordings))
 }
 
 fn normal(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
-/// A factor between one over `most` and `most`.
+/// A random factor between `1 / most` and `most`.
 fn times(rng: &mut ChaCha8Rng, most: f64) -> f64 {
     most.powf(2.0 * rng.random::<f64>() - 1.0)
 }
 
-/// A layer that holds the shaft, waits and lets go.
-fn slipping(layer: usize, rng: &mut ChaCha8Rng) -> Vec<AnyEffect> {
+/// Stick-slip effects of a layer.
+fn stick_slip_effects(layer: usize, rng: &mut ChaCha8Rng) -> Vec<AnyEffect> {
     let mut by = |x: f64| x * times(rng, FACTOR);
     let slip = ShaftSlip {
         layer,
@@ -164,7 +166,7 @@ fn slipping(layer: usize, rng: &mut ChaCha8Rng) -> Vec<AnyEffect> {
     vec![slip.into(), waits.into(), ReleaseDepth { layer, depth_m: 1e-3 * times(rng, FACTOR) }.into()]
 }
 
-/// What the rich law has.
+/// RichEffects of the independent simulator.
 fn ingredients(rng: &mut ChaCha8Rng) -> RichEffects {
     let bristles = Bristles {
         share: 0.5 + 0.5 * rng.random::<f64>(),
@@ -204,21 +206,21 @@ fn path(m: Motion) -> MotionPath {
 fn rich_run(
     layers: usize,
     thick_m: f64,
-    strong: [f64; 2],
+    strength_n: [f64; 2],
     with: &RichEffects,
     m: Motion,
     by: Differs,
 ) -> Columns {
-    let layer = |thickness_m: f64, strong: f64| real::Layer {
+    let layer = |thickness_m: f64, strength_n: f64| real::Layer {
         thickness_m,
-        stiffness_n_per_m: 150.0 * strong,
-        friction_ns_per_m2: 1.5e4 * strong * by[1].exp(),
-        puncture_n: Some(strong * (1.0 + by[2]).max(0.2)),
+        stiffness_n_per_m: 150.0 * strength_n,
+        friction_ns_per_m2: 1.5e4 * strength_n * by[1].exp(),
+        puncture_n: Some(strength_n * (1.0 + by[2]).max(0.2)),
     };
     let thick = if layers > 1 {
-        vec![layer(thick_m, strong[0]), layer(0.08, strong[1])]
+        vec![layer(thick_m, strength_n[0]), layer(0.08, strength_n[1])]
     } else {
-        vec![layer(0.08, strong[0])]
+        vec![layer(0.08, strength_n[0])]
     };
     let tissue = real::Tissue { surface_m: 0.004 + by[0], layers: thick };
     let path = path(m);
@@ -235,20 +237,20 @@ fn rich_run(
 }
 
 fn slip_run(
-    slips: &[Vec<AnyEffect>],
+    stick_slip: &[Vec<AnyEffect>],
     thick_m: f64,
     m: Motion,
     by: Differs,
 ) -> Result<Columns, Box<dyn Error>> {
-    let mut tissue = believed(slips.len());
+    let mut tissue = assumed_tissue(stick_slip.len());
     tissue.surface_m += by[0];
-    if slips.len() > 1 {
+    if stick_slip.len() > 1 {
         tissue.layers[0].thickness_m = thick_m;
     }
     for layer in &mut tissue.layers {
         (layer.stiffness_n_per_m, layer.puncture_n) = (100.0, None);
     }
-    let mut effects: Vec<AnyEffect> = slips.iter().flatten().cloned().collect();
+    let mut effects: Vec<AnyEffect> = stick_slip.iter().flatten().cloned().collect();
     for effect in &mut effects {
         match effect {
             AnyEffect::ShaftSlip(s) => {

@@ -1,11 +1,12 @@
-//! What sparse regressions are given of the cases of an exported challenge, and this diagnosis's own answers:
-//! `cargo run --release -p stylet-diagnose --example peers_terms -- CHALLENGE OUT`
+//! Regression tables of an exported challenge for sparse regression methods, and Stylet's answers: `cargo
+//! run --release -p stylet-diagnose --example regression_tables -- CHALLENGE OUT`
 //!
-//! Per case `NNNN.json` (columns by name, times) with two tables, `NNNN.plain.f32` and `NNNN.white.f32`: the residual of the fitted
-//! base law, what each of the base law's numbers changes, and what every effect of the library adds at the values from which the
-//! diagnosis's own search begins (of effects with a frequency or a depth of their own at the two best of that search). In standard
-//! deviations of the noise, plain or whitened as the diagnosis does; column after column, little-endian. `NNNN.stylet.json` is the
-//! diagnosis. Files that are there stay: an interrupted run goes on where it stopped.
+//! Per case `NNNN.json` (column names, times) with two tables, `NNNN.plain.f32` and `NNNN.white.f32`: the
+//! residual of the fitted base law, its derivatives with respect to the base parameters, and the force that
+//! every effect of the library adds at the start values of Stylet's search (for effects with a frequency or
+//! a depth, at the two best). In standard deviations of the noise, plain or whitened; column after column,
+//! little-endian. `NNNN.stylet.json` is the diagnosis. Existing files are kept, so that an interrupted run
+//! can continue.
 use serde_json::json;
 use std::path::Path;
 use std::sync::Arc;
@@ -27,7 +28,7 @@ type Error = Box<dyn std::error::Error>;
 
 fn main() -> Result<(), Error> {
     let args: Vec<String> = std::env::args().collect();
-    let [_, challenge, out] = &args[..] else { return Err("peers_terms CHALLENGE OUT".into()) };
+    let [_, challenge, out] = &args[..] else { return Err("regression_tables CHALLENGE OUT".into()) };
     let out = Path::new(out);
     std::fs::create_dir_all(out)?;
     let mut cases: Vec<_> =
@@ -39,24 +40,24 @@ fn main() -> Result<(), Error> {
         if about.exists() && answer.exists() {
             continue;
         }
-        let (scenario, evidence) = given(&case.path())?;
+        let (scenario, evidence) = read_case(&case.path())?;
         if !about.exists() {
             write_terms(&stem, &scenario, &evidence)?;
         }
         let start = Instant::now();
         let examined = diagnose(&scenario, &evidence, &Options::default(), |_| {})?;
-        let mut said = serde_json::to_value(&examined.diagnosis)?;
-        said["seconds"] = json!(start.elapsed().as_secs_f64());
-        put(&answer, &serde_json::to_vec(&said)?)?;
+        let mut answer_json = serde_json::to_value(&examined.diagnosis)?;
+        answer_json["seconds"] = json!(start.elapsed().as_secs_f64());
+        put(&answer, &serde_json::to_vec(&answer_json)?)?;
         println!("{} of {}", case.file_name().display(), cases.len());
     }
     Ok(())
 }
 
-/// What an entrant to the challenge sees.
-fn given(folder: &Path) -> Result<(Scenario, Vec<NamedRecording>), Error> {
-    let believed = folder.join("believed.ron");
-    let scenario = Scenario::parse(&believed.display().to_string(), &std::fs::read_to_string(&believed)?)?;
+/// Assumed scenario and recordings of a case.
+fn read_case(folder: &Path) -> Result<(Scenario, Vec<NamedRecording>), Error> {
+    let assumed = folder.join("assumed.ron");
+    let scenario = Scenario::parse(&assumed.display().to_string(), &std::fs::read_to_string(&assumed)?)?;
     let mut evidence = Vec::new();
     for k in 1.. {
         let path = folder.join(format!("{k}.csv"));
@@ -76,7 +77,7 @@ fn write_terms(stem: &Path, scenario: &Scenario, evidence: &[NamedRecording]) ->
     let prepared = PreparedRecordings::new(Arc::new(assumptions_of(scenario)), blocks, 0.0);
     let (fit, data) = fit_base_law(&prepared).ok_or("no base fit")?;
     let base_s = start.elapsed().as_secs_f64();
-    let chosen = choices(&fit, &data, &prepared);
+    let chosen = terms(&fit, &data, &prepared);
     let plain = data.with_noise(Noise::white(data.noise.sd_n()));
     let again = residuals(&fit.model, &plain).ok_or("no replay")?;
     let (names, groups) = table(&fit, &data, &chosen, &stem.with_extension("white.f32"))?;
@@ -93,9 +94,9 @@ fn write_terms(stem: &Path, scenario: &Scenario, evidence: &[NamedRecording]) ->
     put(&stem.with_extension("json"), &serde_json::to_vec(&about)?)
 }
 
-/// Effects at the values from which the search begins.
-fn choices(fit: &Fit, data: &FitData, prepared: &PreparedRecordings) -> Vec<EffectTerm> {
-    let look = ScoreTest::new(fit, data);
+/// Effects at the start values of the search.
+fn terms(fit: &Fit, data: &FitData, prepared: &PreparedRecordings) -> Vec<EffectTerm> {
+    let screening = ScoreTest::new(fit, data);
     let lines = stylet_diagnose::tone_detection::detect_tones(fit, data);
     let mut out = Vec::new();
     for info in general_effects() {
@@ -109,39 +110,39 @@ fn choices(fit: &Fit, data: &FitData, prepared: &PreparedRecordings) -> Vec<Effe
             _ => {}
         }
     }
-    let sought = effect_starts(&look, prepared, &lines).into_iter().flatten().map(|s| s.choice);
+    let sought = effect_starts(&screening, prepared, &lines).into_iter().flatten().map(|s| s.choice);
     out.extend(sought.filter(|c| {
         matches!(c.info.proposal, Proposal::TissueMotion | Proposal::SpectralTone | Proposal::MembraneRupture)
     }));
     out
 }
 
-/// Writes a table; gives the effect of every column but the residual's, nothing for those of the base law, and the recording of every
-/// row, those of the rows of ruptures beyond the number of recordings.
+/// Writes a table; returns the effect of every column without the residual (`None` for base parameters) and
+/// the recording of every row (offset by the number of recordings for rupture rows).
 fn table(
     fit: &Fit,
     data: &FitData,
-    choices: &[EffectTerm],
+    terms: &[EffectTerm],
     path: &Path,
 ) -> Result<(Vec<&'static str>, Vec<usize>), Error> {
-    let look = ScoreTest::new(fit, data);
-    let (recordings, shared) = (data.recording_count(), look.linearization.shared.len());
+    let screening = ScoreTest::new(fit, data);
+    let (recordings, shared) = (data.recording_count(), screening.linearization.shared.len());
     let mut names = Vec::new();
-    let mut columns: Vec<Vec<f64>> = vec![rows(&look.linearization.residual, |_| true)];
-    for (k, column) in look.linearization.columns.iter().enumerate() {
-        // A recording's own number changes that recording alone.
+    let mut columns: Vec<Vec<f64>> = vec![rows(&screening.linearization.residual, |_| true)];
+    for (k, column) in screening.linearization.columns.iter().enumerate() {
+        // A random effect changes one recording only.
         for own in 0..if k < shared { 1 } else { recordings } {
             columns.push(rows(column, |r| k < shared || r == own));
             names.push("");
         }
     }
-    for choice in choices {
-        if let Some(column) = look.effect_column(choice) {
+    for term in terms {
+        if let Some(column) = screening.effect_column(term) {
             columns.push(rows(&column, |_| true));
-            names.push(choice.info.id);
+            names.push(term.info.id);
         }
     }
-    let rest = &look.linearization.residual;
+    let rest = &screening.linearization.residual;
     let of = |parts: &[Vec<f64>], from: usize| -> Vec<usize> {
         parts.iter().enumerate().flat_map(|(r, x)| vec![from + r; x.len()]).collect()
     };
@@ -151,7 +152,7 @@ fn table(
     Ok((names, groups))
 }
 
-/// A column's rows: blocks recording by recording, then ruptures.
+/// Rows of a column: blocks by recording, then ruptures.
 fn rows(column: &JacobianColumn, which: impl Fn(usize) -> bool) -> Vec<f64> {
     let mut out = Vec::new();
     for parts in [&column.innovations, &column.rupture_rows] {
@@ -162,11 +163,11 @@ fn rows(column: &JacobianColumn, which: impl Fn(usize) -> bool) -> Vec<f64> {
     out
 }
 
-/// Written beside, then renamed.
+/// Atomic write: temporary file, then rename.
 fn put(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(".part");
-    std::fs::write(&beside, bytes)?;
-    std::fs::rename(&beside, path)?;
+    let mut temporary = path.as_os_str().to_owned();
+    temporary.push(".part");
+    std::fs::write(&temporary, bytes)?;
+    std::fs::rename(&temporary, path)?;
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! Insertions drawn with known laws, as sets.
+//! Simulated sets of recordings with known models.
 #![allow(dead_code, reason = "every test uses a part")]
 
 use rand::{Rng, SeedableRng, rngs::ChaCha8Rng};
@@ -9,26 +9,26 @@ use stylet_tissue::{
     AnyEffect, DelayedPuncture, ForceLaw, ForceLawState, Layer, ReleaseDepth, ShaftSlip, Tissue,
 };
 
-/// Exponent of the slip in the law that draws.
+/// Exponent of the slip law.
 pub const EXPONENT: f64 = 9.0;
-/// Standard deviation of the sensor's noise in N.
+/// Standard deviation of the sensor noise in N.
 const NOISE_N: f64 = 0.02;
-/// Shift of the surface on the second day, in m.
+/// Shift of the surface on the second day in m.
 pub const SHIFT_M: f64 = 1.5e-3;
 
-/// What is drawn.
-pub struct Drawn {
+/// Seed and surface shift.
+pub struct SimulatedSet {
     pub seed: u64,
     pub shift_m: f64,
 }
 
-impl Default for Drawn {
+impl Default for SimulatedSet {
     fn default() -> Self {
         Self { seed: 7, shift_m: SHIFT_M }
     }
 }
 
-pub fn believed() -> Tissue {
+pub fn assumed_tissue() -> Tissue {
     let layer = Layer {
         name: "gel".into(),
         thickness_m: 0.08,
@@ -39,11 +39,16 @@ pub fn believed() -> Tissue {
     Tissue { surface_m: 0.004, layers: vec![layer] }
 }
 
-/// One insertion by 25 mm, a hold of 5 s, and back.
-fn insertion(name: String, speed_mps: f64, shift_m: f64, rng: &mut impl Rng) -> SegmentedRecording {
+/// One stick_slip_recording by 25 mm with a hold of 5 s and a retraction.
+fn stick_slip_recording(
+    name: String,
+    speed_mps: f64,
+    shift_m: f64,
+    rng: &mut impl Rng,
+) -> SegmentedRecording {
     let mut normal = || -> f64 { StandardNormal.sample(rng) };
     let (surface, friction, tough) = (1e-4 * normal(), 0.03 * normal(), 0.03 * normal());
-    let mut tissue = believed();
+    let mut tissue = assumed_tissue();
     tissue.surface_m += shift_m + surface;
     let mut slip = ShaftSlip {
         layer: 1,
@@ -62,11 +67,11 @@ fn insertion(name: String, speed_mps: f64, shift_m: f64, rng: &mut impl Rng) -> 
         DelayedPuncture { layer: 1, force_n: 3.0 * (1.0 + tough), exponent: 12.0 }.into(),
         ReleaseDepth { layer: 1, depth_m: 1e-3 + 2e-4 * normal() }.into(),
     ];
-    recorded(name, (0.025, speed_mps, 5.0), &tissue, &effects, rng)
+    simulate(name, (0.025, speed_mps, 5.0), &tissue, &effects, rng)
 }
 
-/// An insertion with this law, so deep, at a speed and with a rest of so many s, recorded at 100 Hz with noise.
-fn recorded(
+/// Simulates a recording at 100 Hz with noise.
+fn simulate(
     name: String,
     (stroke_m, speed_mps, rest_s): (f64, f64, f64),
     tissue: &Tissue,
@@ -92,32 +97,32 @@ fn recorded(
     SegmentedRecording::new(name, Recording::new(t, z, f).expect("clean columns"), 1)
 }
 
-/// Four insertions at each of two speeds with a law whose layer slips.
-pub fn drawn(d: &Drawn) -> Vec<SegmentedRecording> {
+/// Four recordings at each of two speeds with the stick-slip model.
+pub fn stick_slip_set(d: &SimulatedSet) -> Vec<SegmentedRecording> {
     let mut rng = ChaCha8Rng::seed_from_u64(d.seed);
     let mut out = Vec::new();
     for (speed_mps, shift_m) in [(1e-3, 0.0), (3e-3, d.shift_m)] {
         for k in 0..4 {
-            out.push(insertion(format!("{speed_mps} {k}"), speed_mps, shift_m, &mut rng));
+            out.push(stick_slip_recording(format!("{speed_mps} {k}"), speed_mps, shift_m, &mut rng));
         }
     }
     out
 }
 
-/// Four insertions at each of two speeds with the base law alone: spring, viscous friction, a puncture force.
-pub fn plain(seed: u64) -> Vec<SegmentedRecording> {
+/// Four recordings at each of two speeds with the base law: spring, viscous friction, puncture force.
+pub fn base_law_set(seed: u64) -> Vec<SegmentedRecording> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut out = Vec::new();
     for speed_mps in [2.5e-3, 6e-3] {
         for k in 0..4 {
             let (surface, tough): (f64, f64) =
                 (StandardNormal.sample(&mut rng), StandardNormal.sample(&mut rng));
-            let mut tissue = believed();
+            let mut tissue = assumed_tissue();
             tissue.surface_m += 1e-4 * surface;
             tissue.layers[0].stiffness_n_per_m = 250.0;
             tissue.layers[0].friction_ns_per_m2 = 2e4;
             tissue.layers[0].puncture_n = Some(2.0 * (1.0 + 0.03 * tough));
-            out.push(recorded(format!("{speed_mps} {k}"), (0.016, speed_mps, 2.0), &tissue, &[], &mut rng));
+            out.push(simulate(format!("{speed_mps} {k}"), (0.016, speed_mps, 2.0), &tissue, &[], &mut rng));
         }
     }
     out

@@ -1,16 +1,16 @@
-//! Promise: what an instrument does wrong is seen in insertions without any law: a force that comes late or is rounded where the way back
-//! begins, a force in air that is not zero; and nothing is seen where nothing is wrong.
+//! Promise: instrument faults are detected without a tissue model (delay, lag, bias, gain, drift), and
+//! nothing is detected in a faultless instrument.
 
-mod drawn;
+mod simulated_recordings;
 
-use drawn::{Drawn, believed, drawn};
+use simulated_recordings::{SimulatedSet, assumed_tissue, stick_slip_set};
 use stylet_diagnose::repeated_insertions::SegmentedRecording;
 use stylet_diagnose::repeated_insertions::instrument_faults::{InstrumentReport, ReferenceRecordings};
 use stylet_record::Recording;
 
-/// Insertions whose force an instrument has changed.
-fn with(change: impl Fn(&Recording) -> Vec<f64>) -> Vec<SegmentedRecording> {
-    drawn(&Drawn { seed: 31, shift_m: 0.0 })
+/// Recordings recordings_with changed forces.
+fn recordings_with(change: impl Fn(&Recording) -> Vec<f64>) -> Vec<SegmentedRecording> {
+    stick_slip_set(&SimulatedSet { seed: 31, shift_m: 0.0 })
         .into_iter()
         .map(|run| {
             let mut recording = run.recording.clone();
@@ -20,34 +20,34 @@ fn with(change: impl Fn(&Recording) -> Vec<f64>) -> Vec<SegmentedRecording> {
         .collect()
 }
 
-fn look(runs: &[SegmentedRecording]) -> InstrumentReport {
-    let refs: Vec<&SegmentedRecording> = runs.iter().collect();
-    InstrumentReport::assess(&ReferenceRecordings::default(), &refs, believed().surface_m)
+fn assess(recordings: &[SegmentedRecording]) -> InstrumentReport {
+    let refs: Vec<&SegmentedRecording> = recordings.iter().collect();
+    InstrumentReport::assess(&ReferenceRecordings::default(), &refs, assumed_tissue().surface_m)
 }
 
-fn shown(instrument: &InstrumentReport) -> Vec<&str> {
+fn detected(instrument: &InstrumentReport) -> Vec<&str> {
     instrument.detected.iter().map(|s| s.effect.as_str()).collect()
 }
 
 #[test]
-fn a_good_instrument_shows_nothing_and_changes_nothing() {
-    let runs = with(|r| r.force_n.clone());
-    let seen = look(&runs);
-    assert!(seen.detected.is_empty(), "{:?}", seen.detected);
-    let undone = seen.calibrate(&runs.iter().collect::<Vec<_>>());
-    for (a, b) in undone.recordings.iter().zip(&runs) {
+fn a_faultless_instrument_is_not_corrected() {
+    let recordings = recordings_with(|r| r.force_n.clone());
+    let report = assess(&recordings);
+    assert!(report.detected.is_empty(), "{:?}", report.detected);
+    let corrected = report.calibrate(&recordings.iter().collect::<Vec<_>>());
+    for (a, b) in corrected.recordings.iter().zip(&recordings) {
         assert_eq!(a.recording, b.recording);
     }
 }
 
 #[test]
-fn a_late_force_is_told_from_a_rounded_one_and_undone() {
+fn a_delay_and_a_lag_are_distinguished() {
     let late_s = 0.3;
-    let late = look(&with(|r| {
+    let late = assess(&recordings_with(|r| {
         let at = |t: f64| r.time_s.partition_point(|x| *x < t).min(r.len() - 1);
         r.time_s.iter().map(|t| r.force_n[at(t - late_s)]).collect()
     }));
-    assert_eq!(shown(&late), ["time_delay"]);
+    assert_eq!(detected(&late), ["time_delay"]);
     assert!((late.delay_s.expect("a delay") - late_s).abs() < 0.05, "{late:?}");
 
     let rounded = |r: &Recording| {
@@ -60,15 +60,15 @@ fn a_late_force_is_told_from_a_rounded_one_and_undone() {
         }
         out
     };
-    let runs = with(rounded);
-    let slow = look(&runs);
-    assert_eq!(shown(&slow), ["low_pass_lag"]);
+    let recordings = recordings_with(rounded);
+    let slow = assess(&recordings);
+    assert_eq!(detected(&slow), ["low_pass_lag"]);
     assert!((slow.lag_s.expect("a lag") - late_s).abs() < 0.15, "{slow:?}");
 }
 
 #[test]
-fn a_force_in_air_is_a_bias_of_the_sensor_and_a_load_tells_its_gain() {
-    let biased = with(|r| r.force_n.iter().map(|f| 1.1 * f + 0.3).collect());
+fn a_force_in_air_gives_the_bias_and_a_load_the_gain() {
+    let biased = recordings_with(|r| r.force_n.iter().map(|f| 1.1 * f + 0.3).collect());
     let refs: Vec<&SegmentedRecording> = biased.iter().collect();
     let t: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
     let wobble = |k: usize| 1e-3 * ((k * 7919) % 101) as f64 / 101.0;
@@ -78,11 +78,11 @@ fn a_force_in_air_is_a_bias_of_the_sensor_and_a_load_tells_its_gain() {
     };
     let (air, load) = (of(0.0), of(5.0));
     let checks = ReferenceRecordings { air: Some(&air), load: Some((&load, 5.0)) };
-    let seen = InstrumentReport::assess(&checks, &refs, believed().surface_m);
-    assert_eq!(shown(&seen), ["force_gain", "force_bias"], "{seen:?}");
-    assert!((seen.gain.expect("a gain") - 0.1).abs() < 0.005);
-    let clean = with(|r| r.force_n.clone());
-    for (a, b) in seen.calibrate(&refs).recordings.iter().zip(&clean) {
+    let report = InstrumentReport::assess(&checks, &refs, assumed_tissue().surface_m);
+    assert_eq!(detected(&report), ["force_gain", "force_bias"], "{report:?}");
+    assert!((report.gain.expect("a gain") - 0.1).abs() < 0.005);
+    let clean = recordings_with(|r| r.force_n.clone());
+    for (a, b) in report.calibrate(&refs).recordings.iter().zip(&clean) {
         for (a, b) in a.recording.force_n.iter().zip(&b.recording.force_n) {
             assert!((a - b).abs() < 0.01 + 0.005 * b.abs(), "{a} is not {b}");
         }
@@ -90,7 +90,7 @@ fn a_force_in_air_is_a_bias_of_the_sensor_and_a_load_tells_its_gain() {
 }
 
 #[test]
-fn a_drive_that_slows_down_softly_is_no_slow_sensor() {
+fn a_soft_stop_of_the_drive_is_no_lag() {
     let ramp_s = 0.4;
     let speed = |t: f64| match t {
         t if t < 10.0 => 2e-3,
@@ -100,7 +100,7 @@ fn a_drive_that_slows_down_softly_is_no_slow_sensor() {
         t if t < 22.0 => -2e-3,
         _ => 0.0,
     };
-    let runs: Vec<SegmentedRecording> = (0..4)
+    let recordings: Vec<SegmentedRecording> = (0..4)
         .map(|run| {
             let mut noise = 17 + run;
             let (mut z, mut t, mut out) = (0.0, 0.0, (Vec::new(), Vec::new(), Vec::new()));
@@ -117,31 +117,32 @@ fn a_drive_that_slows_down_softly_is_no_slow_sensor() {
             SegmentedRecording::new(format!("run {run}"), recording, 1)
         })
         .collect();
-    assert!(look(&runs).detected.is_empty(), "{:?}", look(&runs).detected);
+    assert!(assess(&recordings).detected.is_empty(), "{:?}", assess(&recordings).detected);
 }
 
-/// A zero that runs away by so much a second does so for longer in a long insertion than in a short recording of air; and one that moves by
-/// as much in every recording, however long it lasts, is undone in each by its own.
+/// A drift in N/s lasts longer in a long recording; a drift per recording is corrected recordings_with each
+/// recording's own rate.
 #[test]
-fn a_drift_is_undone_by_what_each_insertion_shows_of_it() {
+fn a_drift_is_corrected_per_recording() {
     let (rate_n_per_s, whole_n) = (0.01, 0.4);
-    let began = |r: &Recording, t: f64| t - r.time_s[0];
-    let by_time =
-        with(|r| r.time_s.iter().zip(&r.force_n).map(|(t, f)| f + rate_n_per_s * began(r, *t)).collect());
-    let by_recording = with(|r| {
-        let share = |t: f64| began(r, t) / r.duration_s();
+    let elapsed = |r: &Recording, t: f64| t - r.time_s[0];
+    let by_time = recordings_with(|r| {
+        r.time_s.iter().zip(&r.force_n).map(|(t, f)| f + rate_n_per_s * elapsed(r, *t)).collect()
+    });
+    let by_recording = recordings_with(|r| {
+        let share = |t: f64| elapsed(r, t) / r.duration_s();
         r.time_s.iter().zip(&r.force_n).map(|(t, f)| f + whole_n * share(*t)).collect()
     });
     let t: Vec<f64> = (0..400).map(|k| 0.01 * f64::from(k)).collect();
     let f = (0..t.len()).map(|k| rate_n_per_s * t[k] + 1e-3 * ((k * 7919) % 101) as f64 / 101.0).collect();
     let air = Recording::new(t.clone(), vec![0.0; t.len()], f).expect("clean columns");
     let checks = ReferenceRecordings { air: Some(&air), load: None };
-    let clean = with(|r| r.force_n.clone());
-    for runs in [by_time, by_recording] {
-        let refs: Vec<&SegmentedRecording> = runs.iter().collect();
-        let seen = InstrumentReport::assess(&checks, &refs, believed().surface_m);
-        assert_eq!(shown(&seen), ["force_drift"], "{seen:?}");
-        for (a, b) in seen.calibrate(&refs).recordings.iter().zip(&clean) {
+    let clean = recordings_with(|r| r.force_n.clone());
+    for recordings in [by_time, by_recording] {
+        let refs: Vec<&SegmentedRecording> = recordings.iter().collect();
+        let report = InstrumentReport::assess(&checks, &refs, assumed_tissue().surface_m);
+        assert_eq!(detected(&report), ["force_drift"], "{report:?}");
+        for (a, b) in report.calibrate(&refs).recordings.iter().zip(&clean) {
             for (a, b) in a.recording.force_n.iter().zip(&b.recording.force_n) {
                 assert!((a - b).abs() < 0.03, "{a} is not {b}");
             }

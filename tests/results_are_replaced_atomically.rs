@@ -1,5 +1,6 @@
-//! Promise: results appear as one set. A command that fails, is killed, or meets another one in its folder leaves the old set or the
-//! new one, never a mixture; what says what was drawn and what came of it are always of the same draw.
+//! Promise: the files of a result are replaced as one set. A command that fails, is killed or meets another
+//! one in its folder leaves the old set or the new one, never a mixture; the files with inputs and results
+//! always belong together.
 
 mod support;
 
@@ -10,8 +11,8 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 use support::{Scratch, root, scenario, stderr_text, stylet, text};
 
-/// Every file of a folder, hidden ones too.
-fn held(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+/// All files of a folder, including hidden ones.
+fn folder_contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let files = fs::read_dir(folder).expect("a folder").flatten().filter(|e| e.path().is_file());
     files
         .map(|e| (e.file_name().to_string_lossy().into_owned(), fs::read(e.path()).expect("a file")))
@@ -22,8 +23,8 @@ fn noise() -> String {
     text(&root().join("scenarios/sweeps/noise.ron"))
 }
 
-/// A sweep that runs until it is killed, waited for until its first shard is there.
-fn begun(out: &str, seed: &str) -> Child {
+/// A sweep that runs until it is killed, after its first shard is written.
+fn start_sweep(out: &str, seed: &str) -> Child {
     let mut child = Command::new(env!("CARGO_BIN_EXE_stylet"))
         .args(["sweep", &noise(), "--trials", "200000", "--seed", seed, "--threads", "1", "--out", out])
         .stdout(Stdio::null())
@@ -40,15 +41,15 @@ fn begun(out: &str, seed: &str) -> Child {
 }
 
 #[test]
-fn a_disk_that_fills_half_way_leaves_the_old_results_as_they_were() {
+fn a_full_disk_leaves_the_old_results_unchanged() {
     let scratch = Scratch::new("set-full");
     let out = scratch.path().join("out");
     let file = text(&scenario("three_layer_latex_constant"));
     let first = stylet(&["run", &file, "--seed", "1", "--quiet", "--out", &text(&out)]);
     assert!(first.status.success(), "{}", stderr_text(&first));
-    let old = held(&out);
+    let old = folder_contents(&out);
     assert!(old.contains_key("manifest.json") && old.contains_key("report.html"), "{:?}", old.keys());
-    // Room for the small files, not for the large ones.
+    // Space for the small files, not for the large ones.
     let command = format!(
         "trap '' XFSZ; ulimit -f 64; '{}' run '{file}' --seed 2 --out '{}'",
         env!("CARGO_BIN_EXE_stylet"),
@@ -62,23 +63,23 @@ fn a_disk_that_fills_half_way_leaves_the_old_results_as_they_were() {
         "{}",
         stderr_text(&output)
     );
-    assert!(held(&out) == old, "something was changed");
+    assert!(folder_contents(&out) == old, "a file changed");
     let third = stylet(&["run", &file, "--seed", "2", "--quiet", "--out", &text(&out)]);
-    assert!(third.status.success() && held(&out) != old);
+    assert!(third.status.success() && folder_contents(&out) != old);
 }
 
 #[test]
-fn a_killed_sweep_over_an_older_folder_leaves_the_draw_that_its_tables_tell_of() {
+fn a_killed_sweep_leaves_the_old_results_unchanged() {
     let scratch = Scratch::new("set-killed");
     let out = scratch.path().join("out");
     let folder = text(&out);
     let first = stylet(&["sweep", &noise(), "--trials", "20", "--seed", "1", "--quiet", "--out", &folder]);
     assert!(first.status.success(), "{}", stderr_text(&first));
-    let old = held(&out);
-    let mut killed = begun(&folder, "2");
+    let old = folder_contents(&out);
+    let mut killed = start_sweep(&folder, "2");
     killed.kill().expect("it is ours");
     killed.wait().expect("it ends");
-    assert!(held(&out) == old, "the tables and what was drawn are of one sweep");
+    assert!(folder_contents(&out) == old, "tables and sweep file belong together");
     let replayed = stylet(&["replay", &folder, "3", "--quiet"]);
     assert!(replayed.status.success(), "{}", stderr_text(&replayed));
     let seed = |csv: &[u8]| {
@@ -90,10 +91,10 @@ fn a_killed_sweep_over_an_older_folder_leaves_the_draw_that_its_tables_tell_of()
 }
 
 #[test]
-fn two_sweeps_do_not_share_a_folder() {
+fn two_sweeps_cannot_share_a_folder() {
     let scratch = Scratch::new("set-two");
     let folder = text(&scratch.path().join("out"));
-    let mut first = begun(&folder, "1");
+    let mut first = start_sweep(&folder, "1");
     let second = stylet(&["sweep", &noise(), "--trials", "20", "--seed", "2", "--out", &folder]);
     let merge = stylet(&["sweep", "merge", &noise(), "--trials", "20", "--out", &folder]);
     let run = stylet(&["run", &text(&scenario("three_layer_latex_constant")), "--out", &folder]);
@@ -107,13 +108,13 @@ fn two_sweeps_do_not_share_a_folder() {
             stderr_text(&other)
         );
     }
-    // The lock went with its holder.
+    // The lock ends with its holder.
     let run = stylet(&["run", &text(&scenario("three_layer_latex_constant")), "--quiet", "--out", &folder]);
     assert!(run.status.success(), "{}", stderr_text(&run));
 }
 
 #[test]
-fn a_draw_that_was_exchanged_under_its_tables_is_not_replayed() {
+fn a_modified_sweep_file_is_not_replayed() {
     let scratch = Scratch::new("set-exchanged");
     let out = scratch.path().join("out");
     let folder = text(&out);

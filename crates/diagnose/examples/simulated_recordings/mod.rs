@@ -1,4 +1,4 @@
-//! Insertions drawn from the law that a measured set was found to follow.
+//! Recordings simulated with the model fitted to a measured set.
 
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -6,31 +6,33 @@ use std::error::Error;
 use std::path::Path;
 use stylet_diagnose::repeated_insertions::SegmentedRecording;
 use stylet_diagnose::repeated_insertions::dataset::{Dataset, find_files};
-use stylet_diagnose::repeated_insertions::population_prediction::{Population, draw_force, phase_at};
+use stylet_diagnose::repeated_insertions::insertion_phase::phase_at;
+use stylet_diagnose::repeated_insertions::population_prediction::draw_force;
+use stylet_diagnose::repeated_insertions::random_effects_population::Population;
 
-/// Correlation time (s) of what the law leaves.
+/// Correlation time (s) of the residual.
 const SLOW_S: f64 = 0.5;
-/// Noise of the sensor (N).
+/// Sensor noise (N).
 const NOISE_N: f64 = 0.012;
-/// Recordings of a population that is known.
-pub const ALL: usize = 1_000_000;
+/// Number of recordings of a population without sampling uncertainty.
+pub const EXACT: usize = 1_000_000;
 
-/// What the command line asks for.
-pub struct Asked {
-    /// The set's file.
+/// Command-line arguments and the data they name.
+pub struct Arguments {
+    /// File of the set.
     pub file: String,
     /// The set.
     pub set: Dataset,
-    /// Its insertions.
+    /// Its recordings.
     pub measured: Vec<SegmentedRecording>,
-    /// How many sets are drawn.
+    /// Number of simulated sets.
     pub sets: usize,
-    /// By which seed.
+    /// Seed.
     pub seed: u64,
 }
 
-/// The words `FILE [SETS [SEED]]`, and what the file names.
-pub fn asked(sets: usize, seed: u64) -> Result<Asked, Box<dyn Error>> {
+/// Parses `FILE [SETS [SEED]]` and loads the set.
+pub fn parse_arguments(sets: usize, seed: u64) -> Result<Arguments, Box<dyn Error>> {
     let mut words = std::env::args().skip(1);
     let file = words.next().ok_or("name a data set")?;
     let sets = words.next().map_or(Ok(sets), |w| w.parse())?;
@@ -41,11 +43,11 @@ pub fn asked(sets: usize, seed: u64) -> Result<Asked, Box<dyn Error>> {
         files.extend(find_files(pattern)?);
     }
     let measured = set.load_recordings(&files, set.tissue.layers.len())?;
-    Ok(Asked { file, set, measured, sets, seed })
+    Ok(Arguments { file, set, measured, sets, seed })
 }
 
-/// A drawn insertion.
-pub fn one(
+/// Simulates a recording.
+pub fn simulate(
     population: &Population,
     run: &SegmentedRecording,
     k: usize,

@@ -1,9 +1,9 @@
-//! What one would guess of a set before any insertion.
+//! Assumed tissue before any insertion.
 
 use stylet_tissue::{Layer, Tissue};
 
-/// A skin of 11 mm on something deep, or that alone.
-pub fn believed(layers: usize) -> Tissue {
+/// A skin of 11 mm on a deep layer, or the deep layer alone.
+pub fn assumed_tissue(layers: usize) -> Tissue {
     let layer = |thickness_m| Layer {
         name: String::new(),
         thickness_m,

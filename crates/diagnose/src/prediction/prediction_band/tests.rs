@@ -1,0 +1,188 @@
+use super::{Band, NOISE_VALUES, SEED, Uncertainty, free_run_force, interval_sd, noise_values};
+use crate::diagnosis_json::{Cause, Diagnosis, Estimate, RandomEffectSd};
+use rand::SeedableRng;
+use rand::rngs::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::likelihood::FitData;
+use stylet_identify::model::{Assumptions, Model};
+use stylet_identify::noise::Noise;
+use stylet_record::Recording;
+use stylet_tissue::{CoulombFriction, Layer, Tissue};
+
+/// Advance by 30 mm in 6 s at 200 Hz, alternating noise of 0.02 N.
+fn blocks() -> BlockAverages {
+    let t: Vec<f64> = (0..1200).map(|k| f64::from(k) / 200.0).collect();
+    let z = t.iter().map(|t| 0.005 * t).collect();
+    let f = t.iter().enumerate().map(|(k, t)| 0.5 * t + if k % 2 == 0 { 0.02 } else { -0.02 }).collect();
+    BlockAverages::new(&Recording::new(t, z, f).expect("a recording"), &[], BLOCK_S)
+}
+
+/// A diagnosis with the fields that a band uses.
+fn diagnosis() -> Diagnosis {
+    let base = |layer: usize, name: &str, value: f64, half: f64| {
+        serde_json::json!({"layer": layer, "name": name, "assumed": value, "value": value, "low": value - half, "high": value + half,
+                           "changed": false, "at_bound": false})
+    };
+    let mut d: Diagnosis = serde_json::from_value(serde_json::json!({
+        "verdict": "named", "causes": [], "not_identifiable": [], "data_quality": [], "search_steps": [], "advice": [],
+        "base_parameters": [
+            base(1, "stiffness_n_per_m", 120.0, 12.0), base(1, "friction_ns_per_m2", 5000.0, 900.0), base(1, "puncture_n", 1.2, 0.3),
+            base(1, "thickness_m", 0.012, 0.001), base(2, "stiffness_n_per_m", 200.0, 8.0), base(2, "thickness_m", 0.05, 0.002),
+            base(0, "surface_m", 0.002, 0.0006)
+        ],
+        "gain": {"held_out": true, "recordings": [], "rmse_before_n": 0.0, "rmse_after_n": 0.0, "floor_n": 0.03, "per_recording_n": []},
+        "residual_structure": {"p_value": 1.0, "depends_on": [], "nats": 0.0, "share": 0.0},
+        "noise": {"sd_n": 0.03, "ar": [0.0, 0.0], "from_air": false}
+    }))
+    .expect("a diagnosis");
+    d.random_effect_sd =
+        RandomEffectSd { puncture: 0.04, rupture_depth_m: 3e-4, surface_m: 2e-4, friction: 0.05 };
+    d.causes = vec![Cause {
+        effect: "coulomb_friction".to_owned(),
+        equivalent: Vec::new(),
+        confidence: 1.0,
+        parameters: BTreeMap::from([("c_n_per_m".to_owned(), Estimate { value: 8.0, low: 7.0, high: 9.5 })]),
+        gain_nats: 0.0,
+        share: 0.0,
+    }];
+    d
+}
+
+#[test]
+fn standard_deviations_come_from_interval_widths() {
+    assert!((interval_sd(1.0, 4.0) - 3.0 / (2.0 * 1.959_963_984_540_054)).abs() < 1e-12);
+    assert_eq!(interval_sd(4.0, 1.0), 0.0);
+}
+
+#[test]
+fn noise_values_are_equally_likely_with_the_given_sd() {
+    let at = noise_values(0.7);
+    assert!((at.iter().map(|x| x * x).sum::<f64>() / 9.0 - 0.49).abs() < 1e-12);
+    assert!(at[4].abs() < 1e-12 && at.windows(2).all(|w| w[0] < w[1]));
+    let ratio = stylet_stats::normal::quantile(0.5 / 9.0) / stylet_stats::normal::quantile(1.5 / 9.0);
+    assert!((at[0] / at[1] - ratio).abs() < 1e-12 && (at[8] + at[0]).abs() < 1e-12);
+}
+
+#[test]
+fn the_uncertainty_is_read_from_the_diagnosis() {
+    let b = blocks();
+    let within = b.within_block_sd_n();
+    assert!(within > 0.005, "{within}");
+    let k = Uncertainty::new(Some(&diagnosis()), std::slice::from_ref(&b));
+    assert_eq!(k.floor_n, 0.03);
+    assert!(
+        (k.block_n - (0.03 * 0.03 - within * within).max(0.03 * 0.03 / 4.0).sqrt()).abs() < 1e-12,
+        "{}",
+        k.block_n
+    );
+    let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} for {b}");
+    let z = stylet_stats::Z95;
+    near(k.base[0][0], 0.1 / z);
+    near(k.base[0][1], 0.18 / z);
+    near(k.base[0][2], 0.25 / z);
+    near(k.base[1][0], 0.04 / z);
+    assert_eq!(k.base[1][1..], [0.0, 0.0]);
+    near(k.thickness_m[0], 0.001 / z);
+    near(k.thickness_m[1], 0.002 / z);
+    near(k.surface_m, 0.0006 / z);
+    assert_eq!((k.effects[0].0.as_str(), k.effects[0].1.as_str()), ("coulomb_friction", "c_n_per_m"));
+    near(k.effects[0].2, 2.5 / (2.0 * z));
+    assert_eq!(k.components().len(), 6);
+    let mut d = diagnosis();
+    d.random_effect_sd = RandomEffectSd { surface_m: 1e-4, ..RandomEffectSd::default() };
+    // Noise hardly above the scatter within a block: the lower limit applies.
+    d.noise.sd_n = 1.0001 * within;
+    let k = Uncertainty::new(Some(&d), std::slice::from_ref(&b));
+    near(k.block_n, d.noise.sd_n / 2.0);
+    assert_eq!(k.components(), ["sensor noise", "parameter intervals", "scatter of the surface"]);
+    let k = Uncertainty::new(None, &[b.clone(), b.clone()]);
+    let rough = crate::base_law_fit::roughness(&[b.clone(), b]);
+    near(k.floor_n, (rough * rough + within * within).sqrt());
+    near(k.block_n, rough);
+    assert_eq!(k.components(), ["sensor noise"]);
+}
+
+fn model() -> Model {
+    let layer = |d: f64, k: f64, f: Option<f64>| Layer {
+        name: String::new(),
+        thickness_m: d,
+        stiffness_n_per_m: k,
+        friction_ns_per_m2: 5000.0,
+        puncture_n: f,
+    };
+    let belief = Assumptions {
+        tissue: Tissue {
+            surface_m: 0.002,
+            layers: vec![layer(0.012, 120.0, Some(1.2)), layer(0.05, 200.0, None)],
+        },
+        known_effects: vec![CoulombFriction { c_n_per_m: 8.0 }.into()],
+        tolerance: vec![0.3; 2],
+        thickness_tolerance: vec![0.1; 2],
+        surface_tolerance_m: 0.01,
+    };
+    Model::base(Arc::new(belief), 1)
+}
+
+/// Order of the draws: surface; per layer stiffness, friction, puncture force (uncertainty, then
+/// scatter), thickness and boundary; random effects; effect parameters.
+#[test]
+fn a_drawn_model_varies_within_its_uncertainty() {
+    let mut k = Uncertainty::new(Some(&diagnosis()), &[blocks()]);
+    let coulomb = k.effects[0].2;
+    // Other effects and other parameters are not used.
+    k.effects.insert(0, ("stribeck_friction".to_owned(), "c_n_per_m".to_owned(), 50.0));
+    k.effects.insert(0, ("coulomb_friction".to_owned(), "c".to_owned(), 50.0));
+    let m = model();
+    for seed in [1, 5, 9] {
+        let out = k.draw(&m, 0, &mut ChaCha8Rng::seed_from_u64(seed));
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut n = || -> f64 { StandardNormal.sample(&mut rng) };
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12 * (1.0 + b.abs()), "{a} for {b}");
+        near(out.tissue.surface_m, 0.002 + k.surface_m * n());
+        for (l, layer) in m.tissue.layers.iter().enumerate() {
+            let drawn = &out.tissue.layers[l];
+            near(drawn.stiffness_n_per_m, layer.stiffness_n_per_m * (1.0 + k.base[l][0] * n()));
+            near(drawn.friction_ns_per_m2, layer.friction_ns_per_m2 * (1.0 + k.base[l][1] * n()));
+            let factor = (1.0 + k.base[l][2] * n()) * (1.0 + 0.04 * n());
+            assert_eq!(drawn.puncture_n.is_some(), l == 0);
+            near(drawn.puncture_n.unwrap_or(0.0), layer.puncture_n.unwrap_or(0.0) * factor);
+            near(drawn.thickness_m, layer.thickness_m + k.thickness_m[l] * n() + 3e-4 * n());
+        }
+        near(out.per_recording[0].surface_m, 2e-4 * n());
+        near(out.per_recording[0].ln_friction, 0.05 * n());
+        near(out.assumed.known_effects[0].parameters()[0], 8.0 + coulomb * n());
+    }
+    // Lower limits: 0, a hundredth of a puncture force, a twentieth of a thickness.
+    let mut wild = k.clone();
+    (wild.base, wild.thickness_m) = (vec![[40.0; 3]; 2], vec![9.0; 2]);
+    let all: Vec<Model> = (0..40).map(|s| wild.draw(&m, 0, &mut ChaCha8Rng::seed_from_u64(s))).collect();
+    let least = |of: &dyn Fn(&Model) -> f64| all.iter().map(of).fold(f64::INFINITY, f64::min);
+    assert_eq!(least(&|m| m.tissue.layers[0].stiffness_n_per_m), 0.0);
+    assert_eq!(least(&|m| m.tissue.layers[1].friction_ns_per_m2), 0.0);
+    assert!((least(&|m| m.tissue.layers[0].puncture_n.unwrap_or(9.0)) - 0.012).abs() < 1e-12);
+    assert!((least(&|m| m.tissue.layers[0].thickness_m) - 0.0006).abs() < 1e-12);
+}
+
+#[test]
+fn band_edges_are_quantiles_of_draws_and_noise() {
+    let b = blocks();
+    let k = Uncertainty::new(Some(&diagnosis()), std::slice::from_ref(&b));
+    let data = FitData::new(Arc::new(vec![b]), Noise::white(0.03), 0.0);
+    let m = model();
+    let (low, high) = Band { known: &k, model: &m, data: &data }.edges(0);
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let draws: Vec<Vec<f64>> =
+        (0..80).filter_map(|_| free_run_force(&k.draw(&m, 0, &mut rng), &data, 0)).collect();
+    assert_eq!(draws.len(), 80);
+    for at in [20, 110, 260] {
+        let mut all: Vec<f64> =
+            draws.iter().flat_map(|d| noise_values(k.block_n).map(|x| d[at] + x)).collect();
+        assert_eq!(all.len(), 80 * NOISE_VALUES);
+        all.sort_by(f64::total_cmp);
+        assert!((low[at] - stylet_stats::quantile_of_sorted(&all, 0.05)).abs() < 1e-12);
+        assert!((high[at] - stylet_stats::quantile_of_sorted(&all, 0.95)).abs() < 1e-12);
+    }
+}
