@@ -1,4 +1,4 @@
-//! Forces of the referee's laws on one motion, as JSON, for a check by an integrator that shares nothing with them:
+//! Forces of the plain and rich worlds for one motion, as JSON, for a check by an integrator that shares nothing with them:
 //! `cargo run --release -p stylet-examine --example trace > trace.json; python3 benches/peers/referee_scipy.py trace.json`
 
 use serde_json::json;

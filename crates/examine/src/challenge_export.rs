@@ -1,4 +1,4 @@
-//! A challenge that others can enter: believed scenarios and recordings without the truth, and a key that stays with the judge.
+//! Export of cases for other programs: assumed scenarios and recordings without the truth, and an answer key kept apart.
 
 use crate::cases::case_id::{CaseId, GENERATOR_VERSION, first_generator_version};
 use crate::cases::case_recordings::make_case;
@@ -15,12 +15,12 @@ use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// What only the judge has: which case hides behind which number.
+/// The answer key: the case behind each number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AnswerKey {
-    /// The drawing that they are of ([`DRAWING`]).
+    /// Version of the case generator ([`GENERATOR_VERSION`]).
     #[serde(default = "first_generator_version")]
-    pub drawing: u32,
+    pub generator_version: u32,
     /// Cases by their numbers.
     pub cases: BTreeMap<String, CaseId>,
 }
@@ -52,7 +52,7 @@ pub enum ChallengeError {
     Record(#[from] stylet_record::RecordError),
 }
 
-/// Where the key of a challenge is: beside its folder.
+/// Path of the answer key, next to the challenge's folder.
 #[must_use]
 pub fn key_path(folder: &Path) -> PathBuf {
     let mut name = folder.file_name().unwrap_or_default().to_os_string();
@@ -60,7 +60,7 @@ pub fn key_path(folder: &Path) -> PathBuf {
     folder.with_file_name(name)
 }
 
-/// Writes a challenge into a folder that is not there yet, and its key beside it. The order of the cases tells nothing.
+/// Writes a challenge into a new folder, and the answer key next to it. The order of the cases is random.
 ///
 /// # Errors
 /// [`ChallengeError`]; nothing half-written stays.
@@ -86,7 +86,8 @@ pub fn export(plan: &Plan, folder: &Path) -> Result<usize, ChallengeError> {
         written?;
         std::fs::write(part.join("README.md"), readme(numbered.len())).map_err(failed)?;
         std::fs::write(part.join("names.txt"), names()).map_err(failed)?;
-        let key = AnswerKey { drawing: GENERATOR_VERSION, cases: numbered.iter().cloned().collect() };
+        let key =
+            AnswerKey { generator_version: GENERATOR_VERSION, cases: numbered.iter().cloned().collect() };
         let text = serde_json::to_vec_pretty(&key).map_err(|e| failed(e.into()))?;
         std::fs::write(key_path(folder), text).map_err(failed)?;
         std::fs::rename(&part, folder).map_err(failed)
@@ -124,7 +125,7 @@ fn readme(cases: usize) -> String {
 {cases} cases. Each folder `cases/NNNN` holds what a simulation believes (`assumed.ron`) and what was measured: `1.csv`, `2.csv` ...
 with the columns `time_s,position_m,force_n` (SI units; position positive into the tissue, force positive when it resists).
 
-The believed law: in the active layer an elastic force `K (z - front)`; the layer ruptures when that force reaches `puncture_n` (if
+The assumed law: in the active layer an elastic force `K (z - front)`; the layer ruptures when that force reaches `puncture_n` (if
 given) or the tip its far face, and the elastic force is gone at once; viscous friction `v sum(b_i l_i)` along the needle inside,
 `l_i` the length inside layer `i`. Fronts follow from `surface_m` and the thicknesses.
 
@@ -153,11 +154,12 @@ Judged with `stylet benchmark score FOLDER answers.json` by whoever has the key.
 /// [`ChallengeError`]: which file, and what would be right.
 pub fn score_answers(folder: &Path, answers: &Path) -> Result<Vec<CaseOutcome>, ChallengeError> {
     let key_file = key_path(folder);
-    let key: AnswerKey = json(&key_file, "it should be the key that the export wrote beside the folder")?;
-    if key.drawing != GENERATOR_VERSION {
+    let key: AnswerKey =
+        json(&key_file, "it should be the answer key that the export wrote next to the folder")?;
+    if key.generator_version != GENERATOR_VERSION {
         let why = format!(
-            "is of drawing {} of the referee, and this is drawing {GENERATOR_VERSION}: export the challenge anew",
-            key.drawing
+            "was made by version {} of the case generator, and this is version {GENERATOR_VERSION}: export the challenge again",
+            key.generator_version
         );
         return Err(ChallengeError::Content { path: key_file.display().to_string(), why });
     }

@@ -1,8 +1,8 @@
-//! The referee of the diagnosis: realities written independently of it, wrong beliefs about them, and the tables that
-//! judge its answers.
+//! Independent simulator for judging the diagnosis: tissue, needle and sensor written without its code, misspecified assumed scenarios, and
+//! the scoring of answers.
 //!
-//! An engine is a function from a [`Question`] (the believed scenario as RON text, the recordings) to an
-//! [`Answer`] (`diagnosis.json` as plain data). It is told nothing of the truth, and this crate knows nothing of
+//! An engine is a function from a [`Question`] (the assumed scenario as RON text, the recordings) to an
+//! [`Answer`] (`diagnosis.json` as plain data). It does not see the truth, and this crate knows nothing about
 //! it: of the crates of this project it depends on those of columns and statistics alone (`record`, `stats`).
 //!
 //! ```
@@ -18,11 +18,11 @@
 //!
 //! | module | what lives there |
 //! |---|---|
-//! | [`reality`] | tissue, needle and sensor, written from the page |
-//! | [`world`] | what is drawn: stacks, motions, effects, what is wrong and how much of it |
-//! | [`judge`] | which answers are right, and the table |
-//! | [`challenge`] | cases for others, and judging their answers |
-//! | [`plan`], [`run`](mod@run) | which cases, and running an engine on them |
+//! | [`simulator`] | tissue, needle and sensor, written from the page |
+//! | [`cases`] | what is drawn: stacks, motions, effects, what is wrong and how much of it |
+//! | [`scoring`] | which answers are right, and the table |
+//! | [`challenge_export`] | cases for others, and judging their answers |
+//! | [`examination_plan`], [`run_cases`](mod@run) | which cases, and running an engine on them |
 #![forbid(unsafe_code)]
 
 pub mod cases;

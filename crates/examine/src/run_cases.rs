@@ -36,7 +36,7 @@ pub enum RunError {
 ///
 /// With a journal (a file of one JSON line per case) every outcome is written as soon as it is there, and cases that the journal
 /// holds are not run again; a line that was cut off when a run was stopped is. A journal belongs to one engine.
-/// `progress` is told how many of how many cases there are.
+/// `progress` receives the number of finished cases and the total.
 ///
 /// # Errors
 /// [`RunError`]. What an engine could not answer is no error of the run: it counts as wrong.
@@ -53,7 +53,7 @@ pub fn run_cases(
         None => None,
         Some(path) => {
             done = read_journal(path).map_err(failed)?;
-            // Written anew beside and renamed, so that a cut-off last line is gone and nothing is lost.
+            // Written to a temporary file and renamed: a truncated last line is dropped and nothing is lost.
             let part = path.with_extension("part");
             let mut text = Vec::new();
             for outcome in done.values() {
@@ -93,7 +93,7 @@ pub fn run_cases(
 /// The outcomes that a journal holds.
 ///
 /// # Errors
-/// What the system says, unless the file is not there; outcomes of another [`DRAWING`].
+/// What the system says, unless the file is not there; an error for outcomes of another [`GENERATOR_VERSION`].
 pub fn read_journal(path: &Path) -> std::io::Result<BTreeMap<CaseId, CaseOutcome>> {
     let file = match std::fs::File::open(path) {
         Err(why) if why.kind() == std::io::ErrorKind::NotFound => return Ok(BTreeMap::new()),
@@ -102,11 +102,11 @@ pub fn read_journal(path: &Path) -> std::io::Result<BTreeMap<CaseId, CaseOutcome
     let mut out = BTreeMap::new();
     for line in std::io::BufReader::new(file).lines() {
         if let Ok(outcome) = serde_json::from_str::<CaseOutcome>(&line?) {
-            if outcome.drawing != GENERATOR_VERSION {
+            if outcome.generator_version != GENERATOR_VERSION {
                 let why = format!(
-                    "holds outcomes of drawing {} of the referee, and this is drawing {GENERATOR_VERSION}: the same numbers are other \
+                    "holds outcomes of version {} of the case generator, and this is version {GENERATOR_VERSION}: the same numbers are other \
                      cases; name another folder",
-                    outcome.drawing
+                    outcome.generator_version
                 );
                 return Err(std::io::Error::new(std::io::ErrorKind::InvalidData, why));
             }
@@ -131,10 +131,13 @@ mod tests {
         super::run_cases(&plan.cases(), Some(&path), &none, &|_, _| {}).expect("a run");
         assert_eq!(read_journal(&path).expect("a journal").len(), 1);
         let text = std::fs::read_to_string(&path).expect("text");
-        let old = text.replace(&format!("\"drawing\":{}", super::GENERATOR_VERSION), "\"drawing\":1");
+        let old = text.replace(
+            &format!("\"generator_version\":{}", super::GENERATOR_VERSION),
+            "\"generator_version\":1",
+        );
         assert_ne!(old, text);
         std::fs::write(&path, &old).expect("written");
-        let why = read_journal(&path).expect_err("another drawing").to_string();
+        let why = read_journal(&path).expect_err("another version").to_string();
         assert!(why.contains("name another folder"), "{why}");
         assert!(super::run_cases(&plan.cases(), Some(&path), &none, &|_, _| {}).is_err());
         assert_eq!(std::fs::read_to_string(&path).expect("text"), old);

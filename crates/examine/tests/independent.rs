@@ -1,9 +1,9 @@
-//! Promise: the referee shares nothing with what it judges. Of this project's crates it depends, directly or through others, on
+//! Promise: the independent simulator shares no code with the diagnosis that it judges. Of this project's crates it depends, directly or through others, on
 //! those that hold columns and statistics alone.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Rooms that the referee may use.
+/// Crates that it may use.
 const ALLOWED: [&str; 2] = ["stylet-record", "stylet-stats"];
 const LOCK: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../Cargo.lock");
 

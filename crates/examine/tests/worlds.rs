@@ -207,7 +207,7 @@ fn the_same_seed_draws_the_same_case_and_another_another() {
         a.question.recordings,
         make_case(&id(2, Severity::Large)).expect("a case").question.recordings
     );
-    // Less of what is wrong leaves the believed stack as it is.
+    // A smaller severity leaves the assumed layers as they are.
     let small = make_case(&id(1, Severity::Small)).expect("a case");
     assert_eq!(a.setup.assumed, small.setup.assumed);
 }

@@ -127,7 +127,7 @@ fn main() -> Result<(), Failure> {
         }
     }
     println!(
-        "\nfriction: share of the joint friction measured on a Panda. off: RMS beside the observer's lag, from the\n\
+        "\nfriction: share of the joint friction measured on a Panda. off: RMS after correction for the observer's lag, from the\n\
          instant of zeroing, median over the seeds. missed, false alarms, delay: median over what was found."
     );
     Ok(())

@@ -174,13 +174,13 @@ fn offline(study: &Study) -> Sourced {
                 });
                 Cell::number(Spread::of(values).map_or("–".to_owned(), |s| percent(s.median)))
             };
-            let told = offline
+            let identified = offline
                 .iter()
                 .filter(|o| o.without_drop.get(layer).copied().flatten().is_some_and(|e| e.separable))
                 .count();
             rows.push(vec![
                 Cell::text(format!("{}, layer {}", case.name(), layer + 1)),
-                Cell::number(format!("{told} of {}", offline.len())),
+                Cell::number(format!("{identified} of {}", offline.len())),
                 error(true, false),
                 error(false, false),
                 error(true, true),

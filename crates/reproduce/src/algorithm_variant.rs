@@ -5,7 +5,7 @@ use stylet_core::EnhanceConfig;
 use stylet_core::config::{Algorithm, Contact, Depths, DerivativeSense, Model, Reset};
 use stylet_scenario::Scenario;
 
-/// What the algorithm is told, and how its detection is tuned.
+/// What the algorithm knows in advance, and how its detection is tuned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Setup {
     /// The paper's protocol: depth unknown, detection tuned within the published range.
@@ -50,7 +50,7 @@ pub enum Ablation {
 pub struct Variant {
     /// Kelvin-Voigt instead of multi-layer.
     pub kelvin_voigt: bool,
-    /// What it is told.
+    /// What it knows in advance.
     pub setup: Setup,
     /// What is left out.
     pub ablation: Ablation,

@@ -188,7 +188,7 @@ pub fn section(study: &Study, claims: &[Claim]) -> Section {
     });
     Section::new("Numbers of ours, and the verdicts that hang on them")
         .text(
-            "Every number that the paper does not give was halved and doubled, one at a time, and the primary conditions computed anew. A claim's letter: its \
+            "Every number that the paper does not give was halved and doubled, one at a time, and the primary conditions computed again. A claim's letter: its \
              effect then lies on the other side of the bar, or exists only with or only without the change; such a verdict is `assumed`.",
         )
         .table(

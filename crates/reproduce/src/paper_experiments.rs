@@ -173,7 +173,7 @@ impl Case {
 }
 
 /// Okamura 2004, liver: `f = a1 z + a2 z²`, `a1` = 48 N/m and `a2` = 5200 N/m², for the first layer, whose
-/// puncture force of 2.3 N then lies 17 mm deep as before; the second bends alike.
+/// puncture force of 2.3 N then lies 17 mm deep as before; the second bends in the same way.
 fn quadratic(scenario: &mut Scenario) {
     if let Some(first) = scenario.tissue.layers.first_mut() {
         first.stiffness_n_per_m = 48.0;

@@ -9,7 +9,7 @@ use stylet_score::{
 /// One run of the algorithm on one recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// The score of SPEC section 10.
+    /// The score (docs/reference/files.md, `score.json`).
     pub score: Score,
     /// Cumulative friction at the end over the true one at that instant; none where the true one is zero.
     pub cumulative_ratio: Option<f64>,

@@ -13,7 +13,7 @@ pub const CHANGED_SEEDS_ARM: u64 = 2;
 /// and seeds of sensitivity conditions that need an arm of their own.
 pub const SENSITIVITY_SEEDS_ARM: u64 = 4;
 
-/// The study under one condition: what was changed, the noise, what the algorithm is told, how many seeds.
+/// The study under one condition: what was changed, the noise, what the algorithm knows in advance, how many seeds.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
     /// The study.
@@ -22,7 +22,7 @@ pub struct View<'a> {
     pub change: Option<Change>,
     /// Noise of the force/torque sensor in mN.
     pub noise_mn: u32,
-    /// What the algorithm is told.
+    /// What the algorithm knows in advance.
     pub setup: Setup,
     /// Seeds.
     pub seeds: u64,

@@ -39,13 +39,13 @@ macro_rules! words {
 words! {
     /// Which law the tissue follows.
     World {
-        Plain = "plain": "the equations of SPEC sections 2 and 6, written anew",
+        Plain = "plain": "the equations of docs/reference/model.md, implemented a second time",
         Rich = "rich": "a law of another form: bristles, foundation springs, damage, tearing, a bending needle",
     }
 }
 
 words! {
-    /// What the believed simulation or the sensor has wrong.
+    /// What is wrong with the assumed simulation or the sensor.
     Wrong {
         Nothing = "nothing": "nothing wrong: K, b, F known to 5 %, geometry exact, white or AR(1) noise, 200 Hz",
         Thickness = "thickness": "every layer's thickness off by up to 2, 5, 10 %",
@@ -107,11 +107,11 @@ words! {
     }
 }
 
-/// Which drawing this is: under another number the same name may stand for another case, and outcomes do not mix. 2: every row
+/// Version of the case generator: under another number the same name may stand for another case, and outcomes do not mix. 2: every row
 /// hides other effects than its neighbours under the same index.
 pub const GENERATOR_VERSION: u32 = 2;
 
-/// The drawing of files that do not say it.
+/// The version of files that do not say it.
 pub(crate) fn first_generator_version() -> u32 {
     1
 }
@@ -129,7 +129,7 @@ pub struct CaseId {
     pub hide: Hide,
     /// How strong it is.
     pub size: Size,
-    /// Seed of the drawing.
+    /// Seed of the generator.
     pub seed: u64,
     /// Number of the case among those of its kind.
     pub index: u64,

@@ -1,4 +1,4 @@
-//! A case: what is believed, what is true, and what was measured.
+//! A case: assumed scenario, true tissue and simulated recordings.
 
 use super::case_id::{CaseId, World};
 use super::case_setup::set_up_case;
@@ -28,7 +28,7 @@ const STEPS_PER_SAMPLE: f64 = 2.0;
 pub struct CaseSetup {
     /// How much is wrong.
     pub amounts: MisspecificationAmounts,
-    /// The stack as it is believed.
+    /// The assumed layers.
     pub assumed: Tissue,
     /// The stack as it is.
     pub truth: Tissue,
@@ -73,7 +73,7 @@ pub struct NamedFile {
 pub struct Question {
     /// The case's name; it says nothing about the truth that the recordings do not.
     pub name: String,
-    /// The believed scenario (RON, SPEC section 8).
+    /// The assumed scenario (RON, docs/reference/files.md).
     pub assumed_ron: String,
     /// What was measured.
     pub recordings: Vec<NamedFile>,
@@ -94,7 +94,7 @@ pub struct Case {
 /// Draws a case.
 ///
 /// # Errors
-/// When the columns make no recording, which is a mistake of the referee.
+/// When the simulated columns are no valid recording, which would be a bug of this crate.
 pub fn make_case(id: &CaseId) -> Result<Case, stylet_record::RecordError> {
     let setup = set_up_case(id);
     let mut rng = ChaCha8Rng::seed_from_u64(id.case_seed());

@@ -14,7 +14,7 @@ use crate::simulator::sensor_noise::SensorNoise;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
-/// A case that misses the strength aimed at is drawn anew so many times.
+/// A case whose effect misses the wanted strength is drawn again at most so many times.
 const ATTEMPTS: u64 = 6;
 
 /// Draws everything but the noise.
@@ -65,14 +65,14 @@ fn attempt_at(id: &CaseId, attempt: u64) -> CaseSetup {
     let amounts = MisspecificationAmounts::of(id.wrong, id.severity);
     // The number of layers must not shift the draws behind it.
     let mut stack_rng = ChaCha8Rng::seed_from_u64(rng.random());
-    let believed = draw_tissue::draw_assumed_tissue(&mut stack_rng, amounts.stack);
+    let assumed = draw_tissue::draw_assumed_tissue(&mut stack_rng, amounts.stack);
     let truth =
-        draw_tissue::draw_true_tissue(&mut ChaCha8Rng::seed_from_u64(rng.random()), &believed, &amounts);
+        draw_tissue::draw_true_tissue(&mut ChaCha8Rng::seed_from_u64(rng.random()), &assumed, &amounts);
     let mut path_rng = ChaCha8Rng::seed_from_u64(rng.random());
     let noise = noise(&mut ChaCha8Rng::seed_from_u64(rng.random()), &amounts);
     let mut rng = ChaCha8Rng::seed_from_u64(rng.random());
-    // The robot goes a little beyond where the stack is believed to end.
-    let (start_m, depth_m) = (-amounts.air_m, 1.03 * believed.end_m() + 3e-3);
+    // The motion ends slightly beyond the assumed layers.
+    let (start_m, depth_m) = (-amounts.air_m, 1.03 * assumed.end_m() + 3e-3);
     let hurry = if amounts.rate_hz > 2000.0 { 2.0 } else { 1.0 };
     let paths = if id.hide == Hide::Instrument {
         draw_motion::draw_repeats(&mut path_rng, start_m, depth_m)
@@ -81,7 +81,7 @@ fn attempt_at(id: &CaseId, attempt: u64) -> CaseSetup {
     };
     let mut setup = CaseSetup {
         amounts,
-        assumed: believed,
+        assumed: assumed,
         truth,
         paths,
         noise,

@@ -21,7 +21,7 @@ pub struct EffectContext<'a> {
     pub size: Size,
 }
 
-/// Tolerances of the believed scenario (SPEC section 8).
+/// Tolerances of the assumed scenario (docs/reference/files.md).
 pub const TOLERANCE: f64 = 0.3;
 /// The same for thicknesses.
 pub const THICKNESS_TOLERANCE: f64 = 0.1;

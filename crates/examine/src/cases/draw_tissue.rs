@@ -1,4 +1,4 @@
-//! Drawing a stack, and what is believed of it.
+//! Draws the true layers and the layers that the scenario assumes.
 
 use super::draw_motion::{log_uniform, uniform};
 use super::misspecification_amounts::{LayerStack, MisspecificationAmounts};
@@ -13,7 +13,7 @@ const USUAL_END_M: f64 = 0.11;
 /// The deepest of all in m.
 const DEEPEST_M: f64 = 0.2;
 
-/// The stack as it is believed.
+/// The assumed layers.
 pub fn draw_assumed_tissue(rng: &mut ChaCha8Rng, stack: LayerStack) -> Tissue {
     let count = match stack {
         LayerStack::Usual => [2, 3, 3, 4][rng.random_range(0..4)],
@@ -75,19 +75,15 @@ fn off(rng: &mut ChaCha8Rng, size: f64) -> f64 {
 
 /// The stack as it is. The draws do not depend on the amounts, so that one insertion is seen with more and less of what
 /// is wrong.
-pub fn draw_true_tissue(
-    rng: &mut ChaCha8Rng,
-    believed: &Tissue,
-    amounts: &MisspecificationAmounts,
-) -> Tissue {
-    let mut truth = believed.clone();
+pub fn draw_true_tissue(rng: &mut ChaCha8Rng, assumed: &Tissue, amounts: &MisspecificationAmounts) -> Tissue {
+    let mut truth = assumed.clone();
     truth.surface_m += off(rng, 1.0) * amounts.surface_m;
     for layer in &mut truth.layers {
         layer.thickness_m *= 1.0 + off(rng, 1.0) * amounts.thickness;
         layer.stiffness_n_per_m *= 1.0 + off(rng, 1.0) * amounts.coefficients;
         layer.friction_ns_per_m2 *= 1.0 + off(rng, 1.0) * amounts.coefficients;
         let factor = 1.0 + off(rng, 1.0) * amounts.coefficients;
-        // Below what the layer reaches at its far face: what is believed to give way by force does so.
+        // Below the elastic force at the far face, so that a layer with a puncture force ruptures by force.
         let most = 0.95 * layer.stiffness_n_per_m * layer.thickness_m;
         layer.puncture_n = layer.puncture_n.map(|f| (f * factor).min(most));
     }
@@ -118,7 +114,7 @@ pub fn draw_encountered_tissue(
     it
 }
 
-/// The believed scenario as RON text (SPEC section 8).
+/// The assumed scenario as RON text (docs/reference/files.md).
 #[must_use]
 pub fn scenario_ron(name: &str, tissue: &Tissue, rate_hz: f64) -> String {
     use core::fmt::Write as _;

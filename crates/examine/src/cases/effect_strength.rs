@@ -1,6 +1,6 @@
 //! How strong something is: the RMS of what the base law leaves of the force without noise when it is re-fitted.
 //!
-//! Given the instants of the ruptures, the base law (SPEC section 2) is linear in every `K_i` and `b_i`; the re-fit is a
+//! Given the instants of the ruptures, the base law (docs/reference/model.md) is linear in every `K_i` and `b_i`; the re-fit is a
 //! linear least squares over all recordings together.
 
 use super::case_recordings::CaseSetup;
@@ -16,7 +16,7 @@ const LOOK_HZ: f64 = 50.0;
 /// Largest step of these simulations in s.
 const LOOK_STEP_S: f64 = 2e-3;
 
-/// What the base law has beside it in the re-fit.
+/// Terms that are re-fitted together with the base law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RefitTerms {
     /// Nothing.
@@ -64,13 +64,13 @@ pub fn unexplained_rms_n(
     setup: &CaseSetup,
     effects: &[Effect],
     shape: Option<&UnmodelledShape>,
-    beside: RefitTerms,
+    terms: RefitTerms,
 ) -> f64 {
     let mut fit = LeastSquares::default();
     let mut row = Vec::new();
     for (there, read) in simulate_effects(setup, effects, shape) {
         for (k, force) in read.into_iter().enumerate() {
-            columns(&mut row, &setup.truth, &there, k, beside);
+            columns(&mut row, &setup.truth, &there, k, terms);
             fit.add(&row, force);
         }
     }
@@ -83,7 +83,7 @@ pub fn unexplained_rms_n(
     square.sqrt()
 }
 
-fn columns(row: &mut Vec<f64>, tissue: &Tissue, there: &Insertion, k: usize, beside: RefitTerms) {
+fn columns(row: &mut Vec<f64>, tissue: &Tissue, there: &Insertion, k: usize, terms: RefitTerms) {
     let (t, z, v) = (there.time_s[k], there.position_m[k], there.velocity_mps[k]);
     let ruptured = there.ruptures_s.iter().filter(|r| **r <= t).count();
     row.clear();
@@ -96,7 +96,7 @@ fn columns(row: &mut Vec<f64>, tissue: &Tissue, there: &Insertion, k: usize, bes
         row.push(v * l);
     }
     let dry = sgn(v) * inside;
-    match beside {
+    match terms {
         RefitTerms::Nothing => {}
         RefitTerms::DryFriction => row.push(dry),
         RefitTerms::Common => {

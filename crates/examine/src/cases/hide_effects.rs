@@ -166,7 +166,7 @@ pub fn intended_effect(id: &CaseId) -> Option<&'static str> {
     }
 }
 
-/// Which of `n` things the case hides. In every row each comes once in `n` cases, in an order that the seed shuffles anew for
+/// Which of `n` things the case hides. In every row each comes once in `n` cases, in an order that the seed shuffles for
 /// every round; rows begin at different places of it (a cyclic Latin square with its rows shuffled), so that the same number of
 /// another row is another thing and a few cases of all rows hold everything about equally often. The severity does not
 /// enter: the same insertion is judged with little and with much of what is wrong.

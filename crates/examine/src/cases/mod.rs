@@ -1,4 +1,4 @@
-//! Which cases there are: what is believed, what is true, what is wrong between them.
+//! The cases: assumed scenario, true tissue, and the misspecification between them.
 
 pub mod case_id;
 pub mod case_recordings;

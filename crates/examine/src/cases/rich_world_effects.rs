@@ -12,7 +12,7 @@ pub const RICH_EFFECTS: [&str; 6] = ["bristles", "foundation", "damage", "tearin
 
 /// Speed in m/s at which damage ruptures a layer at its puncture force: the middle of the motions.
 const DAMAGE_SPEED_MPS: f64 = 3e-3;
-/// Free length of the needle in m (SPEC section 4).
+/// Free length of the needle in m (docs/reference/model.md, section 4).
 const NEEDLE_M: f64 = 0.153;
 
 /// Library effects that describe an ingredient, written down before any run. `unknown` is right for all of them.

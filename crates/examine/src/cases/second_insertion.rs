@@ -1,4 +1,4 @@
-//! A reality into which one can insert again: the same stack, effects and instrument, another motion.
+//! A second insertion into the tissue of a case: same layers, effects and sensor, another motion.
 
 use super::case_id::CaseId;
 use super::case_recordings::{CaseSetup, NamedFile, Question, measure};
@@ -11,7 +11,7 @@ use crate::simulator::motion_path::{MotionPath, MotionPiece};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 
-/// A reality with the insertions made so far.
+/// The tissue of a case with the insertions made so far.
 #[derive(Clone, Debug)]
 pub struct SecondInsertion {
     id: CaseId,
@@ -20,7 +20,7 @@ pub struct SecondInsertion {
 }
 
 impl SecondInsertion {
-    /// The reality of a case, before any insertion.
+    /// The tissue of a case, before any insertion.
     #[must_use]
     pub fn new(id: &CaseId) -> Self {
         let mut setup = set_up_case(id);
@@ -34,7 +34,7 @@ impl SecondInsertion {
         -self.setup.amounts.air_m
     }
 
-    /// A little beyond the end of the believed stack, in m.
+    /// Slightly beyond the end of the assumed layers, in m.
     #[must_use]
     pub fn depth_m(&self) -> f64 {
         1.03 * self.setup.assumed.end_m() + 3e-3
@@ -91,7 +91,7 @@ impl SecondInsertion {
         }
     }
 
-    /// What a right answer to these insertions says, by the rules of [`answers`](crate::judge::answers).
+    /// The expected answer for these insertions (see [`expected_answer`](crate::scoring::expected_answer)).
     #[must_use]
     pub fn expected_answer(&self) -> Expected {
         expected_answer(&self.id, &self.setup)

@@ -1,8 +1,8 @@
 //! Forces that the library lacks.
 //!
-//! Each is a function of the base's motion, of time, of depth or of the ruptures that no effect of SPEC section 6 has. Their
+//! Each is a function of the base's motion, of time, of depth or of the ruptures that no effect of docs/reference/model.md has. Their
 //! strength is what the re-fitted base law leaves *with* a constant, a drift, dry and drive friction, inertia, cutting
-//! and square laws beside it ([`super::strength::Beside::Common`]), so that what the library could take away is not
+//! and square laws re-fitted with it ([`RefitTerms::Common`](super::effect_strength::RefitTerms::Common)), so that what the library could take away is not
 //! counted.
 
 use crate::simulator::insertion::UnmodelledForce;

@@ -9,7 +9,7 @@ use crate::simulator::effect::Effect;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// One number of an answer beside the truth.
+/// One estimated parameter and its true value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ScoredParameter {
     /// Such as `coulomb_friction.c_n_per_m`, or `base.stiffness_n_per_m`.
@@ -33,9 +33,9 @@ pub struct ScoredParameter {
 pub struct CaseOutcome {
     /// The case.
     pub id: CaseId,
-    /// The drawing that it is of ([`DRAWING`]).
+    /// Version of the case generator ([`GENERATOR_VERSION`]).
     #[serde(default = "first_generator_version")]
-    pub drawing: u32,
+    pub generator_version: u32,
     /// What was hidden, by name.
     pub hidden: Vec<String>,
     /// With which numbers.
@@ -52,7 +52,7 @@ pub struct CaseOutcome {
     pub confidence: Vec<(f64, bool)>,
     /// What that was worth.
     pub worth: AnswerScore,
-    /// Numbers beside the truth.
+    /// Estimated parameters with their true values.
     pub numbers: Vec<ScoredParameter>,
     /// Samples.
     pub samples: usize,
@@ -89,7 +89,7 @@ impl CaseOutcome {
         };
         Self {
             id: case.id,
-            drawing: GENERATOR_VERSION,
+            generator_version: GENERATOR_VERSION,
             hidden,
             values,
             strength_sd: case.setup.strength_sd,
@@ -141,9 +141,9 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
     }
     for effect in &case.setup.effects {
         let Some(cause) = answer.causes.iter().find(|c| c.effect == effect.id()) else { continue };
-        let told = in_order(&cause.parameters);
+        let estimates = in_order(&cause.parameters);
         for (path, truth) in effect.parameters() {
-            let Some(e) = told.get(&path) else { continue };
+            let Some(e) = estimates.get(&path) else { continue };
             if path == "layer" {
                 continue;
             }
@@ -201,19 +201,19 @@ mod tests {
 
     #[test]
     fn of_two_terms_the_faster_one_is_the_first() {
-        let told = |numbers: &[(&str, f64)]| -> BTreeMap<String, Estimate> {
+        let estimates = |numbers: &[(&str, f64)]| -> BTreeMap<String, Estimate> {
             let of = |(path, value): &(&str, f64)| {
                 ((*path).to_owned(), Estimate { value: *value, ..Estimate::default() })
             };
             numbers.iter().map(of).collect()
         };
-        let slow_first = told(&[
+        let slow_first = estimates(&[
             ("terms.0.fraction", 0.5),
             ("terms.0.time_constant_s", 6.0),
             ("terms.1.fraction", 0.2),
             ("terms.1.time_constant_s", 0.3),
         ]);
-        let fast_first = told(&[
+        let fast_first = estimates(&[
             ("terms.0.fraction", 0.2),
             ("terms.0.time_constant_s", 0.3),
             ("terms.1.fraction", 0.5),
@@ -221,7 +221,7 @@ mod tests {
         ]);
         assert_eq!(in_order(&slow_first), fast_first);
         assert_eq!(in_order(&fast_first), fast_first);
-        let one = told(&[("terms.0.fraction", 0.2), ("terms.0.time_constant_s", 3.0)]);
+        let one = estimates(&[("terms.0.fraction", 0.2), ("terms.0.time_constant_s", 3.0)]);
         assert_eq!(in_order(&one), one);
     }
 }

@@ -1,4 +1,4 @@
-//! What an engine answers: `diagnosis.json` (SPEC section 7) as plain data. Fields that are not named here are ignored.
+//! The answer of a diagnosis program: `diagnosis.json` (docs/reference/files.md) as plain data. Fields that are not named here are ignored.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -2,13 +2,13 @@
 //!
 //! The rules, with their reasons:
 //!
-//! 1. **What a user cannot know exactly is no cause** (SPEC section 7, 2): a wrong thickness, surface, K, b or F within the
+//! 1. **What a user cannot know exactly is no cause** (docs/reference/algorithms.md): a wrong thickness, surface, K, b or F within the
 //!    stated tolerance, noise of any colour, growing, with tails, and scatter between recordings ask for the verdict
 //!    `none`. Irregular or missing samples are remarks on the data.
 //! 2. **What is there may be named, need not be** where a sensor's ordinary imperfection is the neutral form of an
 //!    effect: a force late by up to two samples *is* a `time_delay`, mains hum *is* a `periodic_interference`, a 12-bit
 //!    converter *is* a `quantisation`.
-//! 3. **`force_gain` cannot be seen** once K, b, F are re-fitted (all forces scale; SPEC section 6): naming it is a guess, and
+//! 3. **`force_gain` cannot be seen** once K, b, F are re-fitted (all forces scale): naming it is a guess, and
 //!    `none` is right. Its size is drawn within the tolerance.
 //! 4. **`position_scale` is the base law with other numbers**: recorded depths and speeds times `1 + eps` are thicknesses times
 //!    `1 + eps`, K over `1 + eps`, b over its square. Within the tolerances both the name and `none` are right.
@@ -16,8 +16,8 @@
 //!    tolerance of either only the name.
 //! 6. **A puncture that depends on speed cannot be seen in one recording**, in which every layer is punctured once: name or
 //!    `none`.
-//! 7. **Lags and delays below one sampling interval** cannot be told from each other: either name.
-//! 8. **Stribeck and presliding friction beside which dry friction leaves less than 0.3 noise standard deviations** are
+//! 7. **Lags and delays below one sampling interval** cannot be distinguished: either name is accepted.
+//! 8. **Stribeck and presliding friction that dry friction imitates to less than 0.3 noise standard deviations** are
 //!    dry friction to anybody: `coulomb_friction` is right as well.
 //! 9. **A rich law's departures have no name of their own**: each ingredient lists the library effects that describe it
 //!    (a foundation spring may be `deep_indentation`), and `unknown` is right as well.
@@ -65,7 +65,7 @@ impl ExpectedCause {
 pub struct Expected {
     /// Causes.
     pub wanted: Vec<ExpectedCause>,
-    /// Names that may stand beside them.
+    /// Further names that are accepted.
     pub optional: Vec<String>,
     /// Names that describe a rich law's ingredients.
     pub allowed: Vec<String>,
@@ -84,7 +84,7 @@ pub struct AnswerScore {
     pub correct: bool,
     /// Some cause is named that is not there.
     pub wrong_name: bool,
-    /// Every wanted cause is found, whatever stands beside.
+    /// Every expected cause is found, whatever else is named.
     pub all_found: bool,
 }
 
@@ -212,7 +212,7 @@ pub fn score_answer(expected: &Expected, answer: &Answer) -> AnswerScore {
     let right = if expected.outside && expected.wanted.is_empty() {
         unknown && !stray
     } else if expected.outside {
-        // The known one beside the unknown: found, under whatever verdict.
+        // Known effect together with an unmodelled force: found, under any verdict.
         !missing
     } else if unknown {
         expected.unknown_is_right && !missing && !stray
@@ -255,8 +255,8 @@ mod tests {
     #[test]
     fn clean_data_are_to_be_called_clean() {
         assert!(score_answer(&wants(&[]), &says(Verdict::None, &[])).correct);
-        let accused = score_answer(&wants(&[]), &says(Verdict::Named, &[("force_bias", &[])]));
-        assert!(!accused.correct && accused.wrong_name);
+        let false_attribution = score_answer(&wants(&[]), &says(Verdict::Named, &[("force_bias", &[])]));
+        assert!(!false_attribution.correct && false_attribution.wrong_name);
         assert!(!score_answer(&wants(&[]), &says(Verdict::Unknown, &[])).correct);
     }
 
@@ -268,9 +268,9 @@ mod tests {
         assert!(score_answer(&one, &says(Verdict::Ambiguous, &[("stribeck_friction", class)])).correct);
         let wide: &[&str] = &["a", "b", "c", "coulomb_friction"];
         assert!(!score_answer(&one, &says(Verdict::Ambiguous, &[("stribeck_friction", wide)])).correct);
-        let beside =
+        let extra_cause =
             score_answer(&one, &says(Verdict::Named, &[("coulomb_friction", &[]), ("force_drift", &[])]));
-        assert!(!beside.correct && beside.all_found && beside.wrong_name);
+        assert!(!extra_cause.correct && extra_cause.all_found && extra_cause.wrong_name);
     }
 
     #[test]

@@ -143,7 +143,7 @@ fn said(out: &mut String, outcomes: &[CaseOutcome]) {
             _ if o.failed.is_some() => "no answer".to_owned(),
             Verdict::None => "none".to_owned(),
             Verdict::Unknown if causes.is_empty() => "unknown".to_owned(),
-            Verdict::Unknown => format!("unknown, beside {}", causes.join(" + ")),
+            Verdict::Unknown => format!("unknown, with {}", causes.join(" + ")),
             _ => causes.join(" + "),
         };
         *by.entry((hidden, said)).or_default() += 1;

@@ -1,9 +1,9 @@
-//! The departures from the base law, written from the table of SPEC section 6: what they are called, their numbers, and
+//! The departures from the base law, written from the effects table of docs/reference/model.md: what they are called, their numbers, and
 //! which of these say how strong they are.
 
 /// One departure with its numbers. Units are those of the parameter paths.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs, reason = "names and units are those of SPEC section 6")]
+#[allow(missing_docs, reason = "names and units are those of docs/reference/model.md")]
 pub enum Effect {
     NonlinearElasticity { kappa_per_m: f64 },
     StressRelaxation { terms: [(f64, f64); 2] },
@@ -34,7 +34,7 @@ pub enum Effect {
     ForceSpikes { rate_hz: f64, size_n: f64 },
 }
 
-/// Their ids, in the order of SPEC section 6.
+/// Their ids, in the order of docs/reference/model.md.
 pub const IDS: [&str; 27] = [
     "nonlinear_elasticity",
     "stress_relaxation",
@@ -65,7 +65,7 @@ pub const IDS: [&str; 27] = [
     "force_spikes",
 ];
 
-/// Names an answer may use beside these: the library's additions for measured insertions.
+/// Further ids that an answer may use: effects added for measured insertions.
 pub const FURTHER_IDS: [&str; 3] = ["viscoelastic_presliding", "deep_indentation", "layer_stiffening"];
 
 impl Effect {

@@ -1,4 +1,4 @@
-//! From the force at the needle's base to the recorded one (SPEC section 6): arm and tool, gain, low-pass, delay, bias
+//! From the force at the needle's base to the recorded one (docs/reference/model.md): arm and tool, gain, low-pass, delay, bias
 //! and drift, interference, noise, saturation, quantisation. What a lag or a delay does between samples is exact for a
 //! force that is linear between knots, jumps included.
 
@@ -25,7 +25,7 @@ pub struct SensorModel {
 }
 
 impl SensorModel {
-    /// The instrument of these departures, with the force late by `late_s` beside.
+    /// The sensor with these effects and a further delay `late_s`.
     #[must_use]
     pub fn new(effects: &[Effect], late_s: f64) -> Self {
         let mut it = Self { gain: 1.0, scale: 1.0, delay_s: late_s, ..Self::default() };

@@ -1,4 +1,4 @@
-//! What was there and what was measured, written from the page (SPEC sections 2, 3 and 6) without any other crate of ours
+//! What was there and what was measured, written from the page (docs/reference/model.md) without any other crate of ours
 //! but the recording's columns.
 //!
 //! | module | what lives there |

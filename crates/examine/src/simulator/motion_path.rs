@@ -1,4 +1,4 @@
-//! Motions of the needle's base (SPEC section 3): pieces whose borders are known, so that the simulation can stop at
+//! Motions of the needle's base (docs/reference/model.md, section 3): pieces whose borders are known, so that the simulation can stop at
 //! each of them.
 
 use core::f64::consts::TAU;

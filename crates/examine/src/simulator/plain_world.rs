@@ -1,4 +1,4 @@
-//! The plain law: the equations of SPEC sections 2 and 6.
+//! The plain law: the equations of docs/reference/model.md.
 //!
 //! Between two instants everything but ruptures is taken along exactly or to second order; a rupture is looked for inside
 //! the step by bisection and put where its condition is met, so that the instants do not depend on the step.
@@ -8,9 +8,9 @@ use super::force_law::{ForceKnot, ForceLaw};
 use super::motion_path::MotionState;
 use super::tissue::Tissue;
 
-/// `sgn` is zero below this speed in m/s (SPEC section 6).
+/// `sgn` is zero below this speed in m/s (docs/reference/model.md).
 pub const DEAD_BAND_MPS: f64 = 1e-5;
-/// Reference speed of power law and rate-dependent puncture in m/s (SPEC section 6).
+/// Reference speed of power law and rate-dependent puncture in m/s (docs/reference/model.md).
 const V0_MPS: f64 = 1e-3;
 /// Ruptures are placed to this precision in s.
 const INSTANT_S: f64 = 1e-9;

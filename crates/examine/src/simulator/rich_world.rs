@@ -1,4 +1,4 @@
-//! A law of another form, of which the base law of SPEC section 2 is the neutral case.
+//! A law of another form, of which the base law of docs/reference/model.md is the neutral case.
 //!
 //! | ingredient | law | neutral |
 //! |---|---|---|

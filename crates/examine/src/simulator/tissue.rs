@@ -1,6 +1,6 @@
 //! The tissue that is really there.
 
-/// One layer (SPEC section 1).
+/// One layer (docs/reference/model.md, section 1).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layer {
     /// Thickness `d_i` in m.

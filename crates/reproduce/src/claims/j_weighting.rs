@@ -1,7 +1,7 @@
 //! (j) Weighting the covariance by W equals scaling the regressor: eqs (8)-(12), (14)-(17).
 //!
 //! Over the first layer of the latex stack, sinusoidal, as every seed's sensor records it: RLS from
-//! `Lambda P0 Lambda` on `phi`, beside RLS from `P0` on `Lambda phi`. The innovations must be the same and the
+//! `Lambda P0 Lambda` on `phi`, compared with RLS from `P0` on `Lambda phi`. The innovations must be the same and the
 //! parameters `Lambda` times the other's. With weights that are powers of two floating-point arithmetic scales
 //! without rounding, so that the identity must hold bit for bit; with the paper's weights up to rounding.
 

@@ -1,5 +1,5 @@
 //! S Figs 3-9 and M Figs 12-14: measured, predicted and enhanced force, and the coefficients. Figs 3 to 6 as
-//! captioned, with unknown layer depth, and beside it with known depth.
+//! captioned, with unknown layer depth, and next to it with known depth.
 
 use super::insertion_panels::{Run, coefficients, force, picture, visited};
 use super::supplement_comparison::{self, Facts, Statement};

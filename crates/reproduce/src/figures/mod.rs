@@ -31,7 +31,7 @@ pub struct Figure {
     pub pictures: Vec<String>,
     /// Pictures as files, each complete: name and content.
     pub files: Vec<(&'static str, String)>,
-    /// Numbers beside it.
+    /// Tables that belong to it.
     pub tables: Vec<Sourced>,
 }
 

@@ -1,4 +1,4 @@
-//! What the supplement says of a figure, beside what is seen here, and why the two differ.
+//! Compares what the supplement says about a figure with what is found here, and says why they differ.
 
 use super::insertion_panels::Run;
 use crate::run_outcome::Outcome;
@@ -182,7 +182,7 @@ pub(super) fn looks(runs: &[Run], panels: &str) -> Vec<[String; 3]> {
 /// The table of a figure from rows: what the supplement says, what is seen here, what makes the difference.
 pub(super) fn listed(rows: Vec<[String; 3]>) -> Sourced {
     Sourced::named(Table {
-        title: "Beside the supplement".to_owned(),
+        title: "Compared with the supplement".to_owned(),
         headers: ["the supplement says (the paper's)", "here (computed)", "what differs, and why (ours)"]
             .map(String::from)
             .to_vec(),
