@@ -54,6 +54,9 @@ impl DiagnosisReport {
         let mut output = OutputFiles::default();
         output.add("report.html", self.html(assumed, &file, inputs.command_line()));
         output.add("diagnosis.json", self.json()?);
+        if let Some(figure) = stylet_report::pages::diagnosis::figure_svg(&self.details) {
+            output.add("figure.svg", figure);
+        }
         output.add_json(INPUTS_FILE, &inputs.with_absolute_paths())?;
         output.add("extended.ron", self.extended_ron(&file)?);
         Ok(output)

@@ -9,9 +9,13 @@ pub use summary_sentence::{recording_differences, summary_sentence};
 
 use crate::page_model::{Page, Section, Status, Tile};
 use crate::pages::formatting::data_quality_table;
+use crate::svg::{FigureOptions, figure};
 use causes_tables::{base_parameters, causes, negligible_effects, not_identifiable};
 use effect_search_steps::search_steps;
-use residual_charts::{assumptions, base_law_residual, before_and_after, remaining_structure};
+use residual_charts::{
+    assumptions, base_law_residual, before_and_after, fit_chart, misfit_chart, remaining_structure,
+    worst_recording,
+};
 use std::fmt::Write as _;
 use stylet_diagnose::DiagnosisResult;
 use stylet_diagnose::diagnosis_json::{Diagnosis, Verdict};
@@ -43,6 +47,23 @@ pub fn page(scenario: &Scenario, file: &str, command: String, examined: &Diagnos
         .section(search_steps(d))
         .section(quality(d))
         .section(reproduce(command, examined))
+}
+
+/// The recording that the base law fits worst as one SVG figure, for pages and papers: force with both fits, and their residuals.
+#[must_use]
+pub fn figure_svg(examined: &DiagnosisResult) -> Option<String> {
+    let d = &examined.diagnosis;
+    let all = recording_curves(examined);
+    let (c, name) = worst_recording(d, &all)?;
+    let charts = [fit_chart(c, name), misfit_chart(d, c, name)];
+    let g = &d.gain;
+    let subtitle = format!(
+        "residual {} N before, {} N after; noise {} N",
+        significant(g.rmse_before_n, 3),
+        significant(g.rmse_after_n, 3),
+        significant(g.floor_n, 3)
+    );
+    Some(figure(&charts, &FigureOptions { title: summary_sentence(d), subtitle, ..FigureOptions::default() }))
 }
 
 fn verdict(d: &Diagnosis) -> Section {

@@ -30,26 +30,58 @@ pub(super) fn assumptions(scenario: &Scenario, d: &Diagnosis, all: &[RecordingCu
         }
     );
     let section = Section::new("Assumptions and misfit").text(text);
-    let square = |c: &RecordingCurves| {
+    let Some((c, name)) = worst_recording(d, all) else { return section };
+    section.chart(misfit_chart(d, c, name))
+}
+
+/// The recording that the base law fits worst, and its name.
+pub(super) fn worst_recording<'a>(
+    d: &'a Diagnosis,
+    all: &'a [RecordingCurves],
+) -> Option<(&'a RecordingCurves, &'a str)> {
+    let mean_square = |c: &RecordingCurves| {
         c.base_residual_n.iter().zip(&c.used).filter(|(_, u)| **u).map(|(e, _)| e * e).sum::<f64>()
             / c.used.iter().filter(|u| **u).count().max(1) as f64
     };
-    let worst = all.iter().zip(&d.gain.recordings).max_by(|a, b| square(a.0).total_cmp(&square(b.0)));
-    let Some((c, name)) = worst else { return section };
+    let named = all.iter().zip(d.gain.recordings.iter().map(String::as_str));
+    named.max_by(|a, b| mean_square(a.0).total_cmp(&mean_square(b.0)))
+}
+
+/// Residuals of the base law and of the extended model over time.
+pub(super) fn misfit_chart(d: &Diagnosis, c: &RecordingCurves, name: &str) -> Chart {
     let line = |name: &str, colour, y: &[f64]| Series::line(name, colour, c.time_s.clone(), y.to_vec());
-    section.chart(
-        Chart::new(format!("{name}: measured minus fitted"), "Time (s)", "Residual (N)")
-            .caption(
-                "The recording that the base law fits worst. Forces are averages over blocks of 20 ms, and ruptures are at their observed times: the \
-                 held-out error in the verdict also contains the error of the predicted rupture times, which is briefly as large as the force drop.",
-            )
-            .group(name.clone())
-            .height(260)
-            .with_series(line("base law, re-fitted", Colour::Vermillion, &c.base_residual_n).width(1.2))
-            .with_series(line("extended model", Colour::Blue, &c.extended_residual_n).width(1.0))
-            .with_level(Level::dotted(2.0 * d.noise.sd_n, "twice the noise of a single sample"))
-            .with_level(Level::dotted(-2.0 * d.noise.sd_n, "")),
-    )
+    Chart::new(format!("{name}: measured minus fitted"), "Time (s)", "Residual (N)")
+        .caption(
+            "The recording that the base law fits worst. Forces are averages over blocks of 20 ms, and ruptures are at their observed times: the \
+             held-out error in the verdict also contains the error of the predicted rupture times, which is briefly as large as the force drop.",
+        )
+        .group(name)
+        .height(260)
+        .with_series(line("base law, re-fitted", Colour::Vermillion, &c.base_residual_n).width(1.2))
+        .with_series(line("extended model", Colour::Blue, &c.extended_residual_n).width(1.0))
+        .with_level(Level::dotted(2.0 * d.noise.sd_n, "twice the noise of a single sample"))
+        .with_level(Level::dotted(-2.0 * d.noise.sd_n, ""))
+}
+
+/// Measured force of a recording, and the force fitted by the base law and by the extended model.
+pub(super) fn fit_chart(c: &RecordingCurves, name: &str) -> Chart {
+    let ruptures = MarkerSet {
+        name: "observed ruptures".to_owned(),
+        colour: Colour::Grey,
+        style: LineStyle::Dashed,
+        side: Side::Right,
+        marks: c.ruptures_s.iter().enumerate().map(|(k, t)| (*t, format!("layer {}", k + 1))).collect(),
+    };
+    let fitted = |e: &[f64]| c.force_n.iter().zip(e).map(|(f, e)| f - e).collect::<Vec<_>>();
+    let line = |name: &str, colour, y: Vec<f64>| Series::line(name, colour, c.time_s.clone(), y);
+    Chart::new(name, "Time (s)", "Force (N)")
+        .caption("Measured, and fitted by the base law and the extended model with ruptures at their observed times.")
+        .group(name)
+        .height(300)
+        .with_series(line("measured", Colour::Grey, c.force_n.clone()).width(3.0))
+        .with_series(line("base law", Colour::Vermillion, fitted(&c.base_residual_n)).width(1.1))
+        .with_series(line("extended model", Colour::Blue, fitted(&c.extended_residual_n)).width(1.3))
+        .with_markers(ruptures)
 }
 
 /// Errors before and after, and the fitted curves of up to 8 recordings.
@@ -83,37 +115,7 @@ pub(super) fn before_and_after(d: &Diagnosis, all: &[RecordingCurves]) -> Sectio
         rows,
     ));
     for (c, name) in all.iter().zip(&g.recordings).take(8) {
-        let ruptures = MarkerSet {
-            name: "observed ruptures".to_owned(),
-            colour: Colour::Grey,
-            style: LineStyle::Dashed,
-            side: Side::Right,
-            marks: c.ruptures_s.iter().enumerate().map(|(k, t)| (*t, format!("layer {}", k + 1))).collect(),
-        };
-        let minus = |e: &[f64]| c.force_n.iter().zip(e).map(|(f, e)| f - e).collect::<Vec<_>>();
-        section = section.chart(
-            Chart::new(name.clone(), "Time (s)", "Force (N)")
-                .caption("Measured, and fitted by the base law and the extended model with ruptures at their observed times.")
-                .group(name.clone())
-                .height(300)
-                .with_series(
-                    Series::line("measured", Colour::Grey, c.time_s.clone(), c.force_n.clone()).width(3.0),
-                )
-                .with_series(
-                    Series::line("base law", Colour::Vermillion, c.time_s.clone(), minus(&c.base_residual_n))
-                        .width(1.1),
-                )
-                .with_series(
-                    Series::line(
-                        "extended model",
-                        Colour::Blue,
-                        c.time_s.clone(),
-                        minus(&c.extended_residual_n),
-                    )
-                    .width(1.3),
-                )
-                .with_markers(ruptures),
-        );
+        section = section.chart(fit_chart(c, name));
     }
     section
 }
