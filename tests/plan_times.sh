@@ -7,7 +7,7 @@ cargo build --quiet --release
 stylet="$(cd "${CARGO_TARGET_DIR:-target}" && pwd)/release/stylet"
 there=$(mktemp -d)
 trap 'rm -rf "$there"' EXIT
-"$stylet" benchmark export --misspecification nothing --severity large --hide one --cases 6 --seed "${1:-128}" --out "$there/cases" >/dev/null 2>&1
+"$stylet" benchmark export --wrong nothing --severity large --hide one --cases 6 --seed "${1:-128}" --out "$there/cases" >/dev/null 2>&1
 echo 'Limits(depth_m: 0.09, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0)' >"$there/limits.ron"
 TIMEFORMAT=%R
 for case in "$there"/cases/cases/*; do

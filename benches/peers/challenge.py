@@ -1,6 +1,6 @@
 """An entrant to the challenge of `stylet benchmark export`: a sparse regression (LassoCV) that sees the exported files alone.
 
-    stylet benchmark export --misspecification nothing,thickness --severity large --cases 60 --seed 702 --out out/challenge
+    stylet benchmark export --wrong nothing,thickness --severity large --cases 60 --seed 702 --out out/challenge
     target/peers/bin/python benches/peers/challenge.py out/challenge out/answers.json
     stylet benchmark score out/challenge out/answers.json
 

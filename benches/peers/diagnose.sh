@@ -25,7 +25,7 @@ stylet=target/release/stylet
 
 given() { # world, cases, seed -> the challenge, exported and with its terms
     local of=target/peers_cases/$1-$2-$3
-    [ -d "$of" ] || "$stylet" benchmark export --world "$1" --misspecification nothing,thickness --severity large \
+    [ -d "$of" ] || "$stylet" benchmark export --world "$1" --wrong nothing,thickness --severity large \
         --hide one,one,two,outside,clean --cases "$((($2 + 1) / 2))" --seed "$3" --out "$of" >&2
     target/release/examples/regression_tables "$of" "$of.terms" >&2
     echo "$of"

@@ -33,7 +33,7 @@ pub struct CaseArgs {
     #[arg(long, value_name = "WORLD", default_value = "plain")]
     pub world: String,
     /// Wrong assumptions about tissue or sensor, one row each; `all` for every word.
-    #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "nothing")]
+    #[arg(long = "wrong", value_name = "WORDS", value_delimiter = ',', default_value = "nothing")]
     pub misspecification: Vec<String>,
     /// Severity of the wrong assumption: small, medium, large.
     #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "small,medium,large")]
@@ -76,13 +76,13 @@ impl CaseArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   stylet benchmark diagnose --severity large
-  stylet benchmark diagnose --misspecification thickness,encoder --severity large --cases 60 --seed 7
-  stylet benchmark diagnose --misspecification all --cases 60 --out out/baseline
+  stylet benchmark diagnose --wrong thickness,encoder --severity large --cases 60 --seed 7
+  stylet benchmark diagnose --wrong all --cases 60 --out out/baseline
   stylet benchmark diagnose --hide outside --cases 48
-  stylet benchmark diagnose --misspecification all --severity large --effect time_delay --cases 60
+  stylet benchmark diagnose --wrong all --severity large --effect time_delay --cases 60
   stylet benchmark diagnose --world rich --hide one --cases 60
 
-An unknown word for --misspecification or --hide is answered by the list of words.
+An unknown word for --wrong or --hide is answered by the list of words.
 
 Writes report.html with the map of where the diagnosis fails, the same as SVG, table.txt (rates with 95 %
 Wilson intervals), table.json and cases.jsonl, one line per case. Cases in it are not run again, so an
@@ -104,7 +104,7 @@ pub struct BenchmarkDiagnoseArgs {
 /// Arguments of `stylet benchmark export`.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:
-  stylet benchmark export --misspecification thickness,encoder --severity large --cases 30 --seed 20261 --out out/challenge
+  stylet benchmark export --wrong thickness,encoder --severity large --cases 30 --seed 20261 --out out/challenge
 
 Writes README.md (the task), names.txt (admissible names) and cases/NNNN with assumed.ron and the
 recordings as CSV. The key with the hidden effects goes to DIR.key.json next to the folder; keep it, and
@@ -121,7 +121,7 @@ pub struct BenchmarkExportArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   stylet benchmark plan --cases 60 --seed 7
-  stylet benchmark plan --misspecification thickness --severity medium --cases 30 --seed 7
+  stylet benchmark plan --wrong thickness --severity medium --cases 30 --seed 7
 
 A case hides one strong effect (never force_gain, which no motion can show). Its first insertion has one
 constant speed and no retraction; a case is open when the diagnosis then has the effect in a class of
@@ -133,7 +133,7 @@ pub struct BenchmarkPlanArgs {
     #[arg(long, value_name = "WORLD", default_value = "plain")]
     pub world: String,
     /// Wrong assumptions about tissue or sensor, one row each (words of `stylet benchmark diagnose`).
-    #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "nothing")]
+    #[arg(long = "wrong", value_name = "WORDS", value_delimiter = ',', default_value = "nothing")]
     pub misspecification: Vec<String>,
     /// Severity of the wrong assumption: small, medium, large.
     #[arg(long, value_name = "WORD", default_value = "medium")]

@@ -58,13 +58,7 @@ impl CaseSelection<'_> {
         };
         let plan = Plan {
             world,
-            wrong: parse_words(
-                "--misspecification",
-                self.misspecification,
-                Wrong::ALL,
-                Wrong::parse,
-                Wrong::as_str,
-            )?,
+            wrong: parse_words("--wrong", self.misspecification, Wrong::ALL, Wrong::parse, Wrong::as_str)?,
             severities: parse_words(
                 "--severity",
                 self.severity,
