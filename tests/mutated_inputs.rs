@@ -226,7 +226,7 @@ fn files_written_by_stylet_are_read_again_or_refused() {
         stylet_examine::run_cases(&cases, None, &|_| Ok(Answer::none()), &|_, _| {}).expect("two cases");
     let lines: Vec<Vec<u8>> = outcomes.iter().filter_map(|o| serde_json::to_vec(o).ok()).collect();
     fuzz("journal", 6_000, &lines, |bytes| serde_json::from_slice::<CaseOutcome>(bytes).is_ok());
-    let key = AnswerKey { drawing: 1, cases: cases.iter().map(|id| (id.name(), *id)).collect() };
+    let key = AnswerKey { generator_version: 1, cases: cases.iter().map(|id| (id.name(), *id)).collect() };
     let key = serde_json::to_vec_pretty(&key).expect("a key");
     fuzz("key", 6_000, &[key], |bytes| serde_json::from_slice::<AnswerKey>(bytes).is_ok());
     let mut few = run.simulation.recording.clone();
