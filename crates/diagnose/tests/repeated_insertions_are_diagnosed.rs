@@ -100,5 +100,5 @@ fn compare_answers(s: &SetDiagnosis) {
         }
         answers.numbers(&format!("out.{k}.parts"), &out.score.phase_squares.map(|p| p.0));
     }
-    answers.compare("recorded_answers.txt", "repeated insertions, base model");
+    answers.compare("recorded_answers.txt", "repeated insertions, base law");
 }

@@ -73,7 +73,7 @@ fn a_simulated_set_recovers_its_model_and_the_surface_shift() {
     for (k, s) in scores.iter().enumerate() {
         answers.numbers(&format!("run {k}"), &[s.rmse_n, s.coverage, floors[k]]);
     }
-    answers.compare("recorded_answers.txt", "a law that slips");
+    answers.compare("recorded_answers.txt", "repeated insertions, stick-slip");
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
     let errors: Vec<f64> = scores.iter().map(|s| s.rmse_n).collect();
     assert!(floors.len() == 8 && mean(&errors) < 1.1 * mean(&floors), "{errors:?} {floors:?}");
