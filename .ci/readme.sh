@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Runs the commands in the README: every line of a ```sh block that begins with `stylet` (or `cargo run --release --`), with the given
-# binary (default: the one that `cargo test` built), in a temporary folder. Files that a reader would bring (log.csv, assumed.ron,
-# a.csv ...) are created first. Lines that are not run are printed with the reason.
+# binary (default: the one that `cargo test` built), in a temporary folder. The scenarios that the reader
+# saves (assumed.ron, real.ron) are taken from the README first. Lines that are not run are printed with the reason.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 stylet=$(realpath "${1:-${CARGO_TARGET_DIR:-$root/target}/debug/stylet}")
@@ -10,22 +10,10 @@ trap 'rm -rf "$work"' EXIT
 ln -s "$root/scenarios" "$work/scenarios"
 cd "$work"
 
-cat >assumed.ron <<'RON'
-Scenario(
-    name: "one gel",
-    tissue: (layers: [(thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]),
-    motion: Program(start_m: -0.004, segments: [Move(velocity_mps: 0.004, duration_s: 4.0), Move(velocity_mps: -0.004, duration_s: 3.0)]),
-    robot: Replay,
-)
-RON
-for name in a b c d; do
-    "$stylet" run assumed.ron --seed "$((1 + ${#name} * $(printf '%d' "'$name")))" --out "made-$name" --quiet
-    cp "made-$name/recording.csv" "$name.csv"
-done
-printf 'Columns(time: (name: "time", scale: 1e-6), position: (name: "pz", scale: 1e-3), force: (name: "fz"))\n' >map.ron
-awk -F, 'NR == 1 { print "time,pz,fz"; next } { printf "%.0f,%.9f,%.9f\n", $1 * 1e6, $2 * 1e3, $3 }' a.csv >log.csv
-head -500 a.csv >samples.csv
-printf 'Limits(depth_m: 0.022, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 60.0, force_n: 6.0)\n' >limits.ron
+# The README's own phantom, and the same with the effect that the README hides in it.
+awk '/^```ron/ { on = 1; next } /^```/ { if (on) exit } on' "$root/README.md" >assumed.ron
+sed 's/^    motion:/    effects: [CoulombFriction(c_n_per_m: 3.0)],\n&/' assumed.ron >real.ron
+grep -q CoulombFriction real.ron || { echo "readme: the README's first RON block is no scenario" >&2; exit 1; }
 
 why_not() {
     case "$1" in

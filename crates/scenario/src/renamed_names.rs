@@ -28,7 +28,6 @@ const FLAGS: &[(&str, &str)] = &[
     ("--believed", "--assumed"),
     ("--law", "--model"),
     ("--grade", "--severity"),
-    ("--wrong", "--misspecification"),
     ("--look", "--from-journal"),
     ("judge", "score"),
 ];
