@@ -138,7 +138,6 @@ fn strips(study: &Study, friction: bool) -> String {
                 study.seeds
             ),
             width_px: 1120.0,
-            ..FigureOptions::default()
         },
     )
 }

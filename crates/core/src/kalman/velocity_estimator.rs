@@ -86,8 +86,9 @@ impl VelocityEstimator {
         if difference != 0.0 || logged != 0.0 {
             self.usual += gain * (at_most(limit, difference * difference) - self.usual);
         }
-        let (noise, position_mps) = self
-            .from_positions(DISAGREEMENT_SDS_SQUARED * at_least(min_variance, self.noise / STEP_NOISE_RATIO));
+        let (noise, position_mps) = self.velocity_from_positions(
+            DISAGREEMENT_SDS_SQUARED * at_least(min_variance, self.noise / STEP_NOISE_RATIO),
+        );
         // Jumps are no noise.
         let clip = at_least(min_variance, DISAGREEMENT_SDS_SQUARED * self.noise);
         self.noise += gain * (at_most(clip, noise) - self.noise);
@@ -113,7 +114,7 @@ impl VelocityEstimator {
 
     /// Noise variance that this step indicates in (m/s)², and the velocity from the positions. Notes a jump where the
     /// squared second difference exceeds `limit`.
-    fn from_positions(&mut self, limit: f64) -> (f64, f64) {
+    fn velocity_from_positions(&mut self, limit: f64) -> (f64, f64) {
         let [now, last, before] = self.step_mps;
         let (change, previous_change) = (now - last, last - before);
         let second_difference = (change - previous_change) * (change - previous_change);

@@ -129,7 +129,7 @@ fn drops_are_assigned_under_a_wide_noise() {
     let wide_noise = FitData::new(Arc::clone(&prepared.blocks), Noise::white(data.noise.sd_n()), 0.0);
     let fit_assigned = |from: &Model, strictness: f64| {
         let rupture_times_s = assign_ruptures(from, &prepared.blocks, &prepared.drops, strictness, rough_n);
-        let next = Model { rupture_times_s: rupture_times_s, ..from.clone() };
+        let next = Model { rupture_times_s, ..from.clone() };
         fit(&next, &wide_noise, Effort { max_iterations: 4, min_gain_nats: 0.3 }).expect("a fit")
     };
     let first = fit_assigned(&Model::base(prepared.assumed.clone(), 2), 1.0);

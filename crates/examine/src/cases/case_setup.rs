@@ -81,7 +81,7 @@ fn attempt_at(id: &CaseId, attempt: u64) -> CaseSetup {
     };
     let mut setup = CaseSetup {
         amounts,
-        assumed: assumed,
+        assumed,
         truth,
         paths,
         noise,

@@ -34,7 +34,7 @@ pub(super) fn unit_mix_ups<A: SampleStream>(
         if value > limit {
             let note =
                 QualityNote::new(QualityKind::UnitMixUp, message, [("value", value), ("limit", limit)]);
-            notes.push(QualityNote { blocking: blocking, ..note });
+            notes.push(QualityNote { blocking, ..note });
         }
     };
     let (low, high) = extent.position_m;

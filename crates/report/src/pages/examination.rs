@@ -57,7 +57,6 @@ fn map(plan: &Plan, cells: &[Row], hide: Hide) -> String {
             plan.seed
         ),
         width_px: 760.0,
-        ..FigureOptions::default()
     };
     heat_map(&map, &options)
 }

@@ -33,7 +33,6 @@ pub fn correlation_map(scenario: &Scenario, shown: &Identifiability) -> String {
         title: "Which effects resemble one another".to_owned(),
         subtitle: format!("{}; effects identifiable at their typical size", scenario.name),
         width_px: 1200.0,
-        ..FigureOptions::default()
     };
     heat_map(&map, &options)
 }

@@ -35,7 +35,6 @@ pub fn page(set: &Dataset, file: &str, found: &SpecimenReport, d: &Diagnosis) ->
         title: "Error by step".to_owned(),
         subtitle: "median held-out RMS on the end of the hold; grey: not kept".to_owned(),
         width_px: 860.0,
-        ..FigureOptions::default()
     };
     let markup = bar_chart(&BarChart { label: "mN rms".to_owned(), bars }, &options);
     let rows = found

@@ -14,12 +14,7 @@ use stylet_report::{Cell, Colour, Status, Table, percent, significant};
 const LABEL: &str = "Friction b (N s/m²)";
 
 fn options(title: &str, subtitle: &str) -> FigureOptions {
-    FigureOptions {
-        title: title.to_owned(),
-        subtitle: subtitle.to_owned(),
-        width_px: 1120.0,
-        ..FigureOptions::default()
-    }
+    FigureOptions { title: title.to_owned(), subtitle: subtitle.to_owned(), width_px: 1120.0 }
 }
 
 fn strip(

@@ -238,12 +238,7 @@ pub(super) fn coefficients(insertion: &Insertion, runs: &[Run], cumulative: bool
 pub(super) fn picture(charts: &[Chart], title: &str, subtitle: &str) -> String {
     figure(
         charts,
-        &FigureOptions {
-            title: title.to_owned(),
-            subtitle: subtitle.to_owned(),
-            width_px: 1120.0,
-            ..FigureOptions::default()
-        },
+        &FigureOptions { title: title.to_owned(), subtitle: subtitle.to_owned(), width_px: 1120.0 },
     )
 }
 

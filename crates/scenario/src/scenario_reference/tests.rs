@@ -5,7 +5,8 @@ fn every_example_is_accepted_and_has_every_field_of_its_section() {
     assert!(sections().len() > 20);
     for section in sections() {
         let text = scenario_with(&section.example);
-        Scenario::parse(&section.title, &text).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let parsed = Scenario::parse(&section.title, &text);
+        assert!(parsed.is_ok(), "{}: {text}", section.title);
         for (name, ..) in &section.fields {
             let path = format!("{}{name}", section.prefix);
             assert!(value_at(&text, &path).is_some(), "`{path}` is missing in the example");

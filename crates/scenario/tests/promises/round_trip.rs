@@ -187,7 +187,7 @@ fn drop_config() -> impl Strategy<Value = DropConfig> {
             replay_per_tick,
         )| DropConfig {
             travel_m,
-            max_duration_s: max_duration_s,
+            max_duration_s,
             compensation_travel_m,
             settle_s,
             standstill_mps,
@@ -214,7 +214,7 @@ fn enhance() -> impl Strategy<Value = EnhanceConfig> {
             time_constant_s,
             noise_sds,
             samples,
-            min_noise_n: min_noise_n,
+            min_noise_n,
             learn_s,
             extrapolate_over_m,
         },

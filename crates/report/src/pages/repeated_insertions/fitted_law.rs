@@ -32,7 +32,6 @@ pub fn ablation_figure(study: &SetDiagnosis) -> String {
         title: "Held-out error by model".to_owned(),
         subtitle: "RMS error on insertions that took no part in the fit".to_owned(),
         width_px: 860.0,
-        ..FigureOptions::default()
     };
     bar_chart(&BarChart { label: "N rms".to_owned(), bars: bars(study) }, &options)
 }
