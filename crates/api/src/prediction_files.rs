@@ -13,30 +13,30 @@ use stylet_scenario::Scenario;
 pub struct ModelOrigin {
     /// The diagnosis that made it.
     pub diagnosis: Option<Diagnosis>,
-    /// What was believed before.
+    /// The scenario before the diagnosis.
     pub assumed: Option<Scenario>,
 }
 
 impl ModelOrigin {
-    /// What lies beside a model; `believed` is what was believed before, where the folder is not to tell. A scenario that is gone since
+    /// The files next to a model; `assumed` is the scenario before the diagnosis when the folder does not name it. A scenario that is gone since
     /// the diagnosis is nobody's error.
     ///
     /// # Errors
-    /// [`Error::Request`] when `diagnosis.json` is of another version, [`Error::Input`] when `believed` is wrong.
-    pub fn of_model_file(model: &Path, believed: Option<&Path>) -> Result<Self, Error> {
-        let beside = model.parent().unwrap_or(Path::new("."));
-        let diagnosis = diagnosis(&beside.join("diagnosis.json"))?;
-        let believed = match believed {
+    /// [`Error::Request`] when `diagnosis.json` is of another version, [`Error::Input`] when `assumed` is wrong.
+    pub fn of_model_file(model: &Path, assumed: Option<&Path>) -> Result<Self, Error> {
+        let folder = model.parent().unwrap_or(Path::new("."));
+        let diagnosis = diagnosis(&folder.join("diagnosis.json"))?;
+        let assumed = match assumed {
             Some(path) => Some(Scenario::load(path)?),
-            None => DiagnosisInputs::from_folder(beside)
+            None => DiagnosisInputs::from_folder(folder)
                 .ok()
                 .and_then(|inputs| Scenario::load(&inputs.scenario).ok()),
         };
-        Ok(Self { diagnosis, assumed: believed })
+        Ok(Self { diagnosis, assumed })
     }
 }
 
-/// The diagnosis that a model came from, if it lies beside it.
+/// The diagnosis that a model came from, if it lies next to it.
 fn diagnosis(path: &Path) -> Result<Option<Diagnosis>, Error> {
     let Ok(text) = std::fs::read_to_string(path) else { return Ok(None) };
     serde_json::from_str(&text).map(Some).map_err(|e| {

@@ -11,7 +11,7 @@ use crate::simulator::rich_world::RichEffects;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
-/// Effects that a tissue of one layer cannot have, or that cannot be told apart from one another when together.
+/// Effects that a tissue of one layer cannot have, or that cannot be distinguished when together.
 fn fits(effect: &Effect, setup: &CaseSetup) -> bool {
     let punctured = setup.truth.layers.iter().any(|l| l.puncture_n.is_some());
     match effect {

@@ -1,4 +1,4 @@
-"""Writes the files beside it with other programs' libraries: h5py, pyarrow, the Python packages mcap and mcap-ros2-support.
+"""Writes the files next to it with other programs' libraries: h5py, pyarrow, the Python packages mcap and mcap-ros2-support.
 
     pip install h5py numpy pyarrow mcap mcap-ros2-support
     python3 make.py
