@@ -1,26 +1,25 @@
-//! The ways in which the online algorithm is run.
+//! Variants of the online algorithm: model, prior knowledge, ablation and sensor.
 
-use crate::detection_tuning::Tuning;
+use crate::tuned_thresholds::Tuning;
 use stylet_core::EnhanceConfig;
 use stylet_core::config::{Algorithm, Contact, Depths, DerivativeSense, Model, Reset};
 use stylet_scenario::Scenario;
 
-/// What the algorithm knows in advance, and how its detection is tuned.
+/// Prior knowledge of the algorithm, and how its detection is tuned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Setup {
     /// The paper's protocol: depth unknown, detection tuned within the published range.
     Tuned,
     /// Depth unknown, the published defaults: `s1 = 0.15 N`, `beta = 0.075 N/s`.
     Published,
-    /// Surface and depths known (the paper's 3-D model), the published defaults: a layer ends at the latest
-    /// at its far face.
+    /// Surface and depths known (the paper's 3-D model), the published defaults; a layer ends at its far face at the latest.
     KnownDepth,
     /// As `Tuned`, without the completions that Stylet needs.
     Literal,
-    /// As `Tuned`, with the derivative acting on the falling force, as the supplement says, instead of the
-    /// rising one, as the laboratory does.
+    /// As `Tuned`, with the derivative acting on the falling force, as in the supplement, instead of the rising one, as in the
+    /// laboratory.
     FallingForce,
-    /// As `Tuned`, without detections by the derivative's trailing edge, as the laboratory has it.
+    /// As `Tuned`, without detections by the trailing edge of the derivative, as in the laboratory.
     NoTrailingEdge,
     /// As `Tuned`, with resets at 6.66 Hz, the laboratory's other frequency.
     SlowReset,
@@ -28,11 +27,11 @@ pub enum Setup {
     SigmaHalved,
     /// As `Tuned`, `s1` doubled.
     SigmaDoubled,
-    /// The scenario's own: for the virtual sensor `s1 = 0.015 N`, which is ours.
+    /// The thresholds of the scenario; for the virtual sensor `s1 = 0.015 N`, an assumed value.
     Own,
 }
 
-/// What is left out.
+/// Part of the algorithm that is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Ablation {
     /// Nothing.
@@ -50,26 +49,26 @@ pub enum Ablation {
 pub struct Variant {
     /// Kelvin-Voigt instead of multi-layer.
     pub kelvin_voigt: bool,
-    /// What it knows in advance.
+    /// Prior knowledge and tuning.
     pub setup: Setup,
-    /// What is left out.
+    /// The part that is left out.
     pub ablation: Ablation,
 }
 
 impl Variant {
-    /// The multi-layer model, whole.
+    /// The multi-layer model without ablation.
     #[must_use]
     pub const fn ml(setup: Setup) -> Self {
         Self { kelvin_voigt: false, setup, ablation: Ablation::None }
     }
 
-    /// The Kelvin-Voigt model, whole.
+    /// The Kelvin-Voigt model without ablation.
     #[must_use]
     pub const fn kv(setup: Setup) -> Self {
         Self { kelvin_voigt: true, setup, ablation: Ablation::None }
     }
 
-    /// The same with something left out.
+    /// The same variant with an ablation.
     #[must_use]
     pub const fn without(self, ablation: Ablation) -> Self {
         Self { ablation, ..self }
@@ -81,13 +80,13 @@ impl Variant {
         if self.kelvin_voigt { "KV" } else { "ML" }
     }
 
-    /// Whether the detection has to be tuned first.
+    /// Whether the detection must be tuned first.
     #[must_use]
     pub const fn is_tuned(self) -> bool {
         !matches!(self.setup, Setup::Published | Setup::KnownDepth | Setup::Own)
     }
 
-    /// The configuration for a sensor of a scenario: always the paper's algorithm.
+    /// The configuration of the paper's algorithm for a sensor of a scenario.
     #[must_use]
     pub fn config(self, scenario: &Scenario, sensor: Sensor, tuning: &Tuning) -> EnhanceConfig {
         let mut config = match sensor {
@@ -125,7 +124,7 @@ impl Variant {
     }
 }
 
-/// Which sensor is listened to.
+/// The sensor whose force the algorithm takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Sensor {
     /// The force/torque sensor.
@@ -135,7 +134,7 @@ pub enum Sensor {
 }
 
 impl Sensor {
-    /// The name that the testbed gives it.
+    /// Its name in the testbed.
     #[must_use]
     pub const fn key(self) -> &'static str {
         match self {
@@ -144,7 +143,7 @@ impl Sensor {
         }
     }
 
-    /// The name in tables.
+    /// Its name in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

@@ -5,10 +5,11 @@
 
 use crate::algorithm_variant::{Ablation, Sensor, Setup, Variant};
 use crate::assumed_value_changes::Change;
-use crate::detection_tuning::{TUNING_FIRST_SEED, TUNING_SEEDS, TUNING_SEEDS_ARM, Tuning};
+use crate::detection_tuning::{TUNING_FIRST_SEED, TUNING_SEEDS, TUNING_SEEDS_ARM};
 use crate::paper_experiments::Case;
 use crate::run_outcome::{Offline, Outcome};
 use crate::simulated_insertion::Insertion;
+use crate::tuned_thresholds::Tuning;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;

@@ -1,53 +1,26 @@
-//! The detection's tuning within the published range, and the threshold of the triggered reset: both found on
-//! noise seeds that are used for nothing else.
+//! Tunes the detection thresholds within the published range, and the threshold of the triggered reset, on noise seeds that are used for
+//! nothing else.
 
 use crate::algorithm_variant::{Ablation, Sensor, Setup, Variant};
 use crate::simulated_insertion::Insertion;
+use crate::tuned_thresholds::{ON_N_PER_S, SIGMA_RUPTURE_N, Tuning};
 use stylet_core::{EnhanceConfig, Enhancer, Sample};
 use stylet_score::match_ruptures;
 
-/// First of the seeds that are used for tuning and for nothing else.
+/// First of the noise seeds that are used only for tuning.
 pub const TUNING_FIRST_SEED: u64 = 1_000_001;
-/// How many, where one simulation serves all,
+/// Number of tuning seeds where one simulation serves all of them.
 pub const TUNING_SEEDS: u64 = 10;
-/// and on the arm.
+/// Number of tuning seeds on the arm.
 pub const TUNING_SEEDS_ARM: u64 = 4;
 
-/// `s1` in N as it is tried, the published default first; 0.03 to 0.15 between the laboratory's phantoms.
-pub const SIGMA_RUPTURE_N: [f64; 4] = [0.15, 0.1, 0.05, 0.03];
-/// `beta` in N/s as it is tried, the published default first; 0.05 to 0.15 between the laboratory's phantoms.
-pub const ON_N_PER_S: [f64; 3] = [0.075, 0.05, 0.15];
-/// Thresholds on `trace P` that are tried; the prior's trace is 2e6. At constant velocity the friction's entry
-/// stays near 1e6 and the threshold must lie above that; where the speed varies it falls too.
+/// Thresholds on `trace P` that are tried; the trace of the prior is 2e6. At constant velocity the entry of the friction stays near 1e6
+/// and the threshold must lie above it; at varying speed that entry falls too.
 pub const TRACE_BELOW: [f64; 14] = [
     2e5, 5e5, 9e5, 9.9e5, 1.000_05e6, 1.000_5e6, 1.002e6, 1.005e6, 1.02e6, 1.05e6, 1.1e6, 1.2e6, 1.4e6, 1.7e6,
 ];
 
-/// What was tuned for a phantom, a motion, a noise and a sensor.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tuning {
-    /// `s1` in N.
-    pub sigma_rupture_n: f64,
-    /// `beta` in N/s.
-    pub on_n_per_s: f64,
-    /// Missed and false ruptures with these over the tuning seeds.
-    pub wrong: usize,
-    /// Threshold on `trace P`.
-    pub trace_below: f64,
-}
-
-impl Default for Tuning {
-    fn default() -> Self {
-        Self {
-            sigma_rupture_n: SIGMA_RUPTURE_N[0],
-            on_n_per_s: ON_N_PER_S[0],
-            wrong: 0,
-            trace_below: 1.000_5e6,
-        }
-    }
-}
-
-/// Missed and false ruptures.
+/// Number of missed and false ruptures.
 fn wrong(insertion: &Insertion, samples: &[Sample], config: &EnhanceConfig) -> usize {
     let mut core =
         Enhancer::new(config.clone(), insertion.surface_m(), vec![Sample::default(); samples.len()]);
@@ -67,7 +40,7 @@ fn reconstruction_n(insertion: &Insertion, samples: &[Sample], config: &EnhanceC
 }
 
 impl Tuning {
-    /// Tunes on recordings, each with the insertion it belongs to; `trace` asks for the reset's threshold too.
+    /// Tunes on recordings, each with its insertion; with `trace` also the threshold of the triggered reset.
     #[must_use]
     pub fn of(recordings: &[(&Insertion, Vec<Sample>)], sensor: Sensor, trace: bool) -> Self {
         let with = |tuning: &Tuning, ablation: Ablation| {

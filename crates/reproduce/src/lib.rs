@@ -31,6 +31,7 @@ pub mod seed_interval;
 pub mod seed_spread;
 pub mod simulated_insertion;
 pub mod study_conditions;
+pub mod tuned_thresholds;
 pub mod value_source;
 
 use all_runs::{Plan, ReproduceError, Study};

@@ -1,6 +1,8 @@
-//! What is kept of one run: its score and what the claims ask beyond it, summed up as the samples come.
+//! Results of one run: its score and further quantities that the claims use, accumulated sample by sample.
 
+use crate::algorithm_variant::{Sensor, Variant};
 use crate::simulated_insertion::Insertion;
+use crate::tuned_thresholds::Tuning;
 use stylet_core::{EnhanceConfig, Enhancer, Sample};
 use stylet_score::{
     EnhancedSample, LayerSample, OfflineEstimate, Score, Scorer, TrueSample, fit_layer_offline,
@@ -11,7 +13,7 @@ use stylet_score::{
 pub struct Outcome {
     /// The score (docs/reference/files.md, `score.json`).
     pub score: Score,
-    /// Cumulative friction at the end over the true one at that instant; none where the true one is zero.
+    /// Estimated over true cumulative friction at the end; `None` where the true one is zero.
     pub cumulative_ratio: Option<f64>,
     /// RMS of the enhanced over RMS of the measured force after the tip has left the last layer and the
     /// algorithm has compensated it (from the exit on when it never does).
@@ -117,22 +119,30 @@ impl Outcome {
     }
 }
 
-/// What can be estimated offline from one recording: nothing of the online algorithm is in it but, where it
-/// says so, the drop's share.
+impl Insertion {
+    /// Runs the algorithm and keeps the quantities that the claims use.
+    #[must_use]
+    pub fn run(&self, samples: &[Sample], sensor: Sensor, variant: Variant, tuning: &Tuning) -> Outcome {
+        Outcome::of(self, samples, &variant.config(&self.scenario, sensor, tuning))
+    }
+}
+
+/// Offline estimates from one recording. They use nothing of the online algorithm, except where stated the elastic share of the force
+/// drop.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Offline {
     /// Friction in N s/m² of the first layer under the supplement's assumption that all force is friction:
     /// least squares of `f` on `dz v`.
     pub friction_only: Option<f64>,
-    /// K and b of every layer that ruptured, without a drop: where the data do not tell the two apart, elastic
-    /// and viscous column weigh the same (the supplement's `W` of eq. 17, `1/v²`).
+    /// K and b of every ruptured layer, without the drop: where the data do not separate them, elastic and viscous column have equal
+    /// weight (the supplement's `W` of eq. 17, `1/v²`).
     pub without_drop: Vec<Option<OfflineEstimate>>,
-    /// The same with the drop's share, as the online algorithm measured it, deciding the split.
+    /// The same, split by the share of the drop that the online algorithm measured.
     pub with_drop: Vec<Option<OfflineEstimate>>,
 }
 
 impl Offline {
-    /// From the samples of an insertion; `shares` are the drops' elastic shares.
+    /// From the samples of an insertion; `shares` are the elastic shares of the force drops.
     #[must_use]
     pub fn of(insertion: &Insertion, samples: &[Sample], shares: &[Option<f64>]) -> Self {
         let ruptures = &insertion.simulation.truth.ruptures;

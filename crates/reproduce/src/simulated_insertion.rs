@@ -1,22 +1,21 @@
-//! A scenario, simulated once, and what sensors and algorithms make of it.
+//! A scenario, simulated once: its sensor readings, and traces of the online algorithm on them.
 
 use crate::algorithm_variant::{Sensor, Variant};
-use crate::detection_tuning::Tuning;
-use crate::run_outcome::Outcome;
+use crate::tuned_thresholds::Tuning;
 use stylet_core::Sample;
 use stylet_scenario::Scenario;
 use stylet_score::{LayerTruth, Trace, score_run};
 use stylet_testbed::{ForceSensor, InsertionSample, SimulateError, Simulation, simulate};
 use stylet_tissue::TissueForce;
 
-/// A scenario, simulated, with its layers.
+/// A simulated scenario with its layers.
 #[derive(Clone, Debug)]
 pub struct Insertion {
     /// The scenario.
     pub scenario: Scenario,
     /// Recording and truth.
     pub simulation: Simulation,
-    /// The layers as the law has them.
+    /// The true layers.
     pub layers: Vec<LayerTruth>,
 }
 
@@ -40,8 +39,8 @@ impl Insertion {
         Ok(Self { scenario: scenario.clone(), simulation, layers })
     }
 
-    /// The same insertion as another seed's force/torque sensor records it, with white noise of `noise_mn`:
-    /// the noise moves nothing, so that the motion need not be simulated again.
+    /// Force in N that the force/torque sensor reads with the noise of another seed, white noise of `noise_mn` in mN. The noise does not
+    /// affect the motion, so the insertion need not be simulated again.
     #[must_use]
     pub fn reading(&self, seed: u64, noise_mn: u32) -> Vec<f64> {
         let Some(sensor) = self.scenario.sensor.force_torque() else { return Vec::new() };
@@ -63,7 +62,7 @@ impl Insertion {
             .collect()
     }
 
-    /// The samples as the core takes them.
+    /// The samples of the recording with the given force, as input of the core.
     #[must_use]
     pub fn samples(&self, force_n: &[f64]) -> Vec<Sample> {
         let recording = self.simulation.recording.samples().zip(force_n);
@@ -83,12 +82,6 @@ impl Insertion {
         self.layers.first().map_or(0.0, |l| l.front_m)
     }
 
-    /// Runs the algorithm and keeps what the claims ask for.
-    #[must_use]
-    pub fn run(&self, samples: &[Sample], sensor: Sensor, variant: Variant, tuning: &Tuning) -> Outcome {
-        Outcome::of(self, samples, &variant.config(&self.scenario, sensor, tuning))
-    }
-
     /// Runs the algorithm and keeps every sample's output, for a figure.
     #[must_use]
     pub fn trace(&self, force_n: &[f64], sensor: Sensor, variant: Variant, tuning: &Tuning) -> Trace {
@@ -97,7 +90,7 @@ impl Insertion {
         score_run(recording, force_n, truth, &self.layers, &config).0
     }
 
-    /// What a sensor recorded.
+    /// Force in N that a sensor recorded.
     #[must_use]
     pub fn force_n(&self, sensor: Sensor) -> &[f64] {
         self.simulation.readings.iter().find(|r| r.sensor == sensor.key()).map_or(&[], |r| &r.force_n)

@@ -1,68 +1,28 @@
-//! A case: assumed scenario, true tissue and simulated recordings.
+//! Simulates the recordings of a case: the question given to an engine, and the truth.
 
-use super::case_id::{CaseId, World};
+use super::case_definition::CaseSetup;
+use super::case_id::CaseId;
 use super::case_setup::set_up_case;
 use super::draw_tissue;
 use super::misspecification_amounts::MisspecificationAmounts;
-use super::unmodelled_shapes::UnmodelledShape;
 use crate::simulator::effect::Effect;
-use crate::simulator::force_law::ForceLaw;
 use crate::simulator::force_sensor::SensorModel;
 use crate::simulator::insertion::{Insertion, UnmodelledForce, simulate_insertion};
 use crate::simulator::motion_path::MotionPath;
-use crate::simulator::plain_world::PlainWorld;
-use crate::simulator::rich_world::{RichEffects, RichWorld};
-use crate::simulator::sensor_noise::{NoiseGenerator, SensorNoise};
-use crate::simulator::tissue::Tissue;
+use crate::simulator::sensor_noise::NoiseGenerator;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 use stylet_record::Recording;
 
-/// Steps of the simulation are at most this long in s: 5 kHz.
+/// Longest step of the simulation in s (5 kHz).
 const STEP_S: f64 = 2e-4;
-/// ... and at least two to a sample.
+/// Least number of simulation steps per sample.
 const STEPS_PER_SAMPLE: f64 = 2.0;
-
-/// Everything about a case but the noise.
-#[derive(Clone, Debug)]
-pub struct CaseSetup {
-    /// How much is wrong.
-    pub amounts: MisspecificationAmounts,
-    /// The assumed layers.
-    pub assumed: Tissue,
-    /// The stack as it is.
-    pub truth: Tissue,
-    /// The motions.
-    pub paths: Vec<MotionPath>,
-    /// The noise.
-    pub noise: SensorNoise,
-    /// The law that the tissue follows.
-    pub world: World,
-    /// Ingredients of the rich law.
-    pub rich: RichEffects,
-    /// What of the library is hidden.
-    pub effects: Vec<Effect>,
-    /// What else is.
-    pub shape: Option<UnmodelledShape>,
-    /// Strength of all that is hidden, in noise standard deviations.
-    pub strength_sd: f64,
-}
-
-impl CaseSetup {
-    /// The law of a tissue in this world. The rich law knows no effects of the library but those of tool and sensor.
-    #[must_use]
-    pub fn law(&self, tissue: &Tissue, effects: &[Effect]) -> Box<dyn ForceLaw> {
-        match self.world {
-            World::Plain => Box::new(PlainWorld::new(tissue, effects)),
-            World::Rich => Box::new(RichWorld::new(tissue, &self.rich)),
-        }
-    }
-}
 
 /// One recording under its name.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NamedFile {
-    /// Such as a file's name.
+    /// File name.
     pub name: String,
     /// The columns.
     pub recording: Recording,
@@ -71,26 +31,27 @@ pub struct NamedFile {
 /// What an engine is given.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Question {
-    /// The case's name; it says nothing about the truth that the recordings do not.
+    /// Name of the case; it reveals nothing about the truth.
     pub name: String,
     /// The assumed scenario (RON, docs/reference/files.md).
     pub assumed_ron: String,
-    /// What was measured.
+    /// The measured recordings.
     pub recordings: Vec<NamedFile>,
 }
 
 /// A case with its truth.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// Which.
+    /// Identifier.
     pub id: CaseId,
-    /// What is hidden, and how it was measured.
+    /// What is hidden, and how it is measured.
     pub setup: CaseSetup,
     /// What an engine is given.
     pub question: Question,
-    /// What each recording met, without noise.
+    /// The insertion of each recording, without noise.
     pub there: Vec<Insertion>,
 }
+
 /// Draws a case.
 ///
 /// # Errors
@@ -101,17 +62,17 @@ pub fn make_case(id: &CaseId) -> Result<Case, stylet_record::RecordError> {
     rng.set_stream(0);
     let (mut recordings, mut there) = (Vec::new(), Vec::new());
     for (k, path) in setup.paths.iter().enumerate() {
-        let mut own = ChaCha8Rng::seed_from_u64(rng.random());
-        let (recording, insertion) = measure(&setup, path, &mut own)?;
+        let mut recording_rng = ChaCha8Rng::seed_from_u64(rng.random());
+        let (recording, insertion) = measure(&setup, path, &mut recording_rng)?;
         recordings.push(NamedFile { name: format!("{}.csv", k + 1), recording });
         there.push(insertion);
     }
     let name = format!("case {:016x}", id.case_seed());
-    let believed_ron = draw_tissue::scenario_ron(&name, &setup.assumed, setup.amounts.rate_hz);
-    Ok(Case { id: *id, question: Question { name, assumed_ron: believed_ron, recordings }, setup, there })
+    let assumed_ron = draw_tissue::scenario_ron(&name, &setup.assumed, setup.amounts.rate_hz);
+    Ok(Case { id: *id, question: Question { name, assumed_ron, recordings }, setup, there })
 }
 
-/// Instants at which samples are taken in s.
+/// Sample times in s, with jitter and dropped samples.
 fn sample_times_s(path: &MotionPath, amounts: &MisspecificationAmounts, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let n = (path.duration_s() * amounts.rate_hz) as usize;
     let mut out = Vec::with_capacity(n);
@@ -132,6 +93,7 @@ fn sample_times_s(path: &MotionPath, amounts: &MisspecificationAmounts, rng: &mu
     out
 }
 
+/// Simulates one insertion and measures it: the recording, and the insertion without noise.
 pub(crate) fn measure(
     setup: &CaseSetup,
     path: &MotionPath,
@@ -183,7 +145,7 @@ pub(crate) fn measure(
 }
 
 impl Case {
-    /// Samples of all recordings.
+    /// Number of samples in all recordings.
     #[must_use]
     pub fn samples(&self) -> usize {
         self.question.recordings.iter().map(|r| r.recording.len()).sum()

@@ -1,8 +1,8 @@
-//! From a case's name to everything about it but the noise: drawn until what is hidden is as strong as it should be and
-//! can be seen.
+//! Draws the setup of a case from its identifier. The draw is repeated until the hidden effects have the required strength and
+//! are distinguishable.
 
+use super::case_definition::CaseSetup;
 use super::case_id::{CaseId, Hide, Size};
-use super::case_recordings::CaseSetup;
 use super::distinguishable_effects::{is_clear_of_ruptures, is_identified_by_ruptures};
 use super::draw_effect;
 use super::draw_motion::{self, log_uniform, uniform};
@@ -14,10 +14,10 @@ use crate::simulator::sensor_noise::SensorNoise;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
-/// A case whose effect misses the wanted strength is drawn again at most so many times.
+/// Largest number of draws of a case whose effect misses the required strength.
 const ATTEMPTS: u64 = 6;
 
-/// Draws everything but the noise.
+/// Draws everything but the noise realisation.
 #[must_use]
 pub fn set_up_case(id: &CaseId) -> CaseSetup {
     let (low, high) = strength_range_sd(id.size);
@@ -49,7 +49,7 @@ pub fn set_up_case(id: &CaseId) -> CaseSetup {
     kept.map_or_else(|| attempt_at(id, 0), |k| k.1)
 }
 
-/// The strengths that a size stands for, in noise standard deviations.
+/// Least and largest strength of a size, in noise standard deviations.
 #[must_use]
 pub fn strength_range_sd(size: Size) -> (f64, f64) {
     match size {
@@ -63,7 +63,7 @@ fn attempt_at(id: &CaseId, attempt: u64) -> CaseSetup {
     let mut rng = ChaCha8Rng::seed_from_u64(id.case_seed());
     rng.set_stream(1 + attempt);
     let amounts = MisspecificationAmounts::of(id.wrong, id.severity);
-    // The number of layers must not shift the draws behind it.
+    // A generator of its own: the number of layers must not shift the later draws.
     let mut stack_rng = ChaCha8Rng::seed_from_u64(rng.random());
     let assumed = draw_tissue::draw_assumed_tissue(&mut stack_rng, amounts.stack);
     let truth =
@@ -92,7 +92,7 @@ fn attempt_at(id: &CaseId, attempt: u64) -> CaseSetup {
         strength_sd: 0.0,
     };
     let (low, high) = strength_range_sd(id.size);
-    // A little inside, so that the last step of the search need not be exact.
+    // Slightly inside the range, so that the last step of the search need not be exact.
     let target = log_uniform(&mut rng, 1.1 * low, 0.9 * high) * setup.noise.sd_n;
     hide_effects(&mut rng, id, &mut setup, target);
     setup

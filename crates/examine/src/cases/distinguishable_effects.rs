@@ -1,14 +1,14 @@
-//! Whether what is hidden can be seen by anybody.
+//! Whether the hidden effects of a case can be distinguished in its recordings at all.
 
+use super::case_definition::CaseSetup;
 use super::case_id::Size;
-use super::case_recordings::CaseSetup;
 use super::effect_strength::simulate_effects;
 use crate::simulator::effect::Effect;
 
-/// The least distance in m from a rupture at which a membrane breaks: nearer ones are one event to anybody.
+/// Least distance in m between the puncture of a membrane and a rupture; closer ones are a single event in the recording.
 const MEMBRANE_APART_M: f64 = 2e-3;
 
-/// Whether a membrane breaks clear of every rupture of a layer.
+/// Whether every hidden membrane breaks away from the ruptures of the layers.
 pub fn is_clear_of_ruptures(setup: &CaseSetup) -> bool {
     setup.effects.iter().all(|e| match *e {
         Effect::HiddenMembrane { depth_m, stiffness_n_per_m, puncture_n } => {
@@ -25,8 +25,8 @@ pub fn is_clear_of_ruptures(setup: &CaseSetup) -> bool {
     })
 }
 
-/// Whether a puncture force that depends on speed does so where it can be seen: at least one layer gives way by force in two
-/// recordings at forces that differ by as much as the size asks for.
+/// Whether a rate-dependent puncture force is identified by the ruptures: at least one layer is punctured by force in two recordings, at
+/// forces that differ by as much as the size requires.
 pub fn is_identified_by_ruptures(setup: &CaseSetup, size: Size) -> bool {
     let depends = setup.effects.iter().any(|e| matches!(e, Effect::RateDependentPuncture { .. }));
     if !depends || setup.paths.len() < 2 {

@@ -1,9 +1,9 @@
-//! How strong something is: the RMS of what the base law leaves of the force without noise when it is re-fitted.
+//! Strength of an effect: RMS residual of the re-fitted base law on the force without noise.
 //!
-//! Given the instants of the ruptures, the base law (docs/reference/model.md) is linear in every `K_i` and `b_i`; the re-fit is a
+//! Given the rupture times, the base law (docs/reference/model.md) is linear in every `K_i` and `b_i`; the re-fit is a
 //! linear least squares over all recordings together.
 
-use super::case_recordings::CaseSetup;
+use super::case_definition::CaseSetup;
 use crate::cases::unmodelled_shapes::UnmodelledShape;
 use crate::simulator::effect::Effect;
 use crate::simulator::force_sensor::SensorModel;
@@ -11,7 +11,7 @@ use crate::simulator::insertion::{Insertion, UnmodelledForce, simulate_insertion
 use crate::simulator::plain_world::sgn;
 use crate::simulator::tissue::Tissue;
 
-/// Samples per second at which strengths are measured.
+/// Sample rate in Hz at which strengths are computed.
 const LOOK_HZ: f64 = 50.0;
 /// Largest step of these simulations in s.
 const LOOK_STEP_S: f64 = 2e-3;
@@ -27,7 +27,7 @@ pub enum RefitTerms {
     Common,
 }
 
-/// The force without noise of every recording as it would be read, and what else there was.
+/// Simulates every recording with the given effects: the insertion, and the sensor reading in N without noise.
 #[must_use]
 pub fn simulate_effects(
     setup: &CaseSetup,
@@ -58,7 +58,7 @@ pub fn max_force_n(setup: &CaseSetup) -> f64 {
     simulate_effects(setup, &[], None).iter().flat_map(|(_, f)| f).fold(0.1, |m, f| f.abs().max(m))
 }
 
-/// RMS in N of what the re-fitted base law leaves.
+/// RMS residual in N of the re-fitted base law.
 #[must_use]
 pub fn unexplained_rms_n(
     setup: &CaseSetup,
@@ -117,7 +117,7 @@ fn columns(row: &mut Vec<f64>, tissue: &Tissue, there: &Insertion, k: usize, ter
     }
 }
 
-/// Linear least squares by normal equations: enough for a strength.
+/// Linear least squares by normal equations; its accuracy is sufficient for a strength.
 #[derive(Default)]
 struct LeastSquares {
     gram: Vec<Vec<f64>>,

@@ -1,7 +1,7 @@
-//! Hiding effects, ingredients and shapes in a case, at the strength aimed at.
+//! Adds hidden effects, rich-law effects and unmodelled shapes to a case and scales them to a target strength.
 
+use super::case_definition::CaseSetup;
 use super::case_id::{CaseId, Hide, World};
-use super::case_recordings::CaseSetup;
 use super::draw_effect::{self, EffectContext};
 use super::effect_strength::{RefitTerms, max_force_n, unexplained_rms_n};
 use super::rich_world_effects::{self, RICH_EFFECTS};
@@ -11,7 +11,7 @@ use crate::simulator::rich_world::RichEffects;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
-/// Effects that a tissue of one layer cannot have, or that cannot be distinguished when together.
+/// Whether a tissue can have an effect: boundaries need two layers, puncture effects a layer that is punctured.
 fn fits(effect: &Effect, setup: &CaseSetup) -> bool {
     let punctured = setup.truth.layers.iter().any(|l| l.puncture_n.is_some());
     match effect {
@@ -21,7 +21,7 @@ fn fits(effect: &Effect, setup: &CaseSetup) -> bool {
     }
 }
 
-/// Pairs of which one contains the other, or that are one and the same for the base law.
+/// Whether two effects can be distinguished when both are present: they differ, and belong to different families.
 fn apart(a: &Effect, b: &Effect) -> bool {
     const FAMILIES: [&[&str]; 3] = [
         &["coulomb_friction", "stribeck_friction", "presliding_friction"],
@@ -31,7 +31,7 @@ fn apart(a: &Effect, b: &Effect) -> bool {
     a.id() != b.id() && !FAMILIES.iter().any(|f| f.contains(&a.id()) && f.contains(&b.id()))
 }
 
-/// Instrument faults, as issue and data sheets name them.
+/// Instrument faults.
 const INSTRUMENT: [&str; 8] = [
     "force_gain",
     "force_bias",
@@ -47,7 +47,7 @@ fn number_of(id: &str) -> usize {
     IDS.iter().position(|x| *x == id).unwrap_or(0)
 }
 
-/// Hides what the case's name asks for, `target_n` in N of residual in all.
+/// Hides the effects that the identifier requests; together they leave a residual of `target_n` in N.
 pub fn hide_effects(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, target_n: f64) {
     let largest = max_force_n(setup);
     let sd = setup.noise.sd_n;
@@ -73,7 +73,7 @@ pub fn hide_effects(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, ta
     for k in 0..count {
         let effect = (0..200u64).find_map(|turn| {
             let which = match (id.hide, k) {
-                // Every effect equally often; where one does not fit, the next.
+                // Every effect equally often; one that does not fit is replaced by the next.
                 (Hide::Instrument, _) => {
                     let n = INSTRUMENT.len();
                     number_of(INSTRUMENT[(in_turn(id, n) + turn as usize) % n])
@@ -86,7 +86,7 @@ pub fn hide_effects(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, ta
                 _ => rng.random_range(0..IDS.len()),
             };
             let e = draw_effect::draw_effect(rng, which, &case);
-            // Where several are asked for, none is one that nobody can see.
+            // Among several effects a force gain could not be identified.
             let lone = matches!(id.hide, Hide::One | Hide::Instrument);
             let seen = lone || !matches!(e, Effect::ForceGain { .. });
             (seen && fits(&e, setup) && setup.effects.iter().all(|o| apart(o, &e))).then_some(e)
@@ -112,7 +112,7 @@ pub fn hide_effects(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, ta
     };
 }
 
-/// How many ingredients of the rich law a case has, and they.
+/// Draws the rich-law effects of a case and scales them to the target strength.
 fn enrich(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, target_n: f64) {
     let count = match id.hide {
         Hide::One | Hide::Mixed => 1,
@@ -141,20 +141,20 @@ fn enrich(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, target_n: f6
     setup.rich = all;
 }
 
-/// All that a case's number can ask for: the library's effects and the shapes outside it.
+/// Names of everything that a case can hide: the effects of the library and the shapes outside it.
 #[must_use]
 pub fn hidden_names() -> Vec<&'static str> {
     IDS.iter().chain(&UNMODELLED_SHAPES).copied().collect()
 }
 
-/// One of [`things`] by its name.
+/// One of [`hidden_names`] by its name.
 #[must_use]
 pub fn hidden_name(name: &str) -> Option<&'static str> {
     hidden_names().into_iter().find(|t| *t == name)
 }
 
-/// What a case's number asks it to hide first: an effect, a shape outside the library, or nothing. Where the stack cannot have
-/// an effect, the next of the list is hidden instead.
+/// The first effect or shape that the identifier requests; `None` for clean cases and for those with effects of the rich law. If the
+/// stack cannot have the effect, the next of the list is hidden instead.
 #[must_use]
 pub fn intended_effect(id: &CaseId) -> Option<&'static str> {
     match id.hide {
@@ -166,10 +166,10 @@ pub fn intended_effect(id: &CaseId) -> Option<&'static str> {
     }
 }
 
-/// Which of `n` things the case hides. In every row each comes once in `n` cases, in an order that the seed shuffles for
-/// every round; rows begin at different places of it (a cyclic Latin square with its rows shuffled), so that the same number of
-/// another row is another thing and a few cases of all rows hold everything about equally often. The severity does not
-/// enter: the same insertion is judged with little and with much of what is wrong.
+/// Index of the item, out of `n`, that the case hides. Within a misspecification row each item comes once in `n` cases, in an order
+/// shuffled per round by the seed. Rows start at different positions of that order (a cyclic Latin square with shuffled rows), so that
+/// a few cases of all rows cover every item about equally often. The severity does not enter: the same insertion is examined at
+/// every severity.
 fn in_turn(id: &CaseId, n: usize) -> usize {
     let round = id.index / n as u64;
     let world = if id.world == World::Plain { 0 } else { 0x6a09_e667_f3bc_c909 };
@@ -179,7 +179,7 @@ fn in_turn(id: &CaseId, n: usize) -> usize {
     order[((id.index % n as u64) as usize + start) % n]
 }
 
-/// The numbers `0..n` in an order of the seed's.
+/// The numbers `0..n`, shuffled by the seed.
 fn shuffled(seed: u64, n: usize) -> Vec<usize> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut order: Vec<usize> = (0..n).collect();
@@ -189,7 +189,7 @@ fn shuffled(seed: u64, n: usize) -> Vec<usize> {
     order
 }
 
-/// The effect at the strength aimed at, as nearly as plausible numbers allow.
+/// Scales an effect to the target strength, as closely as plausible parameters allow.
 fn strengthened(setup: &CaseSetup, effect: Effect, target_n: f64, largest_n: f64) -> Effect {
     let mut effect = effect;
     for _ in 0..5 {

@@ -1,5 +1,6 @@
 //! The cases: assumed scenario, true tissue, and the misspecification between them.
 
+pub mod case_definition;
 pub mod case_id;
 pub mod case_recordings;
 pub mod case_setup;

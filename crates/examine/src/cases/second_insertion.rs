@@ -1,7 +1,8 @@
 //! A second insertion into the tissue of a case: same layers, effects and sensor, another motion.
 
+use super::case_definition::CaseSetup;
 use super::case_id::CaseId;
-use super::case_recordings::{CaseSetup, NamedFile, Question, measure};
+use super::case_recordings::{NamedFile, Question, measure};
 use super::case_setup::set_up_case;
 use super::draw_motion::uniform;
 use super::draw_tissue;
@@ -46,7 +47,7 @@ impl SecondInsertion {
         self.setup.effects.iter().map(|e| e.id().to_owned()).collect()
     }
 
-    /// One constant speed, 2.2 to 3.5 mm/s, from the start to the end: no way back.
+    /// One constant speed, 2.2 to 3.5 mm/s, from the start to the end, without retraction.
     #[must_use]
     pub fn constant(&self) -> MotionPath {
         let mut rng = ChaCha8Rng::seed_from_u64(self.id.case_seed());
@@ -97,7 +98,7 @@ impl SecondInsertion {
         expected_answer(&self.id, &self.setup)
     }
 
-    /// What an answer to these insertions is worth.
+    /// Scores an answer to these insertions.
     #[must_use]
     pub fn score_answer(&self, answer: &Answer) -> AnswerScore {
         score_answer(&self.expected_answer(), answer)

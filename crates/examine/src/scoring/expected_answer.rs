@@ -24,8 +24,8 @@
 //! 10. **Traces never count**, nor does what is listed as invisible.
 //! 11. **A class** (`equivalent`) counts as its best member would if it holds a right one among at most four.
 
+use crate::cases::case_definition::CaseSetup;
 use crate::cases::case_id::{CaseId, Hide};
-use crate::cases::case_recordings::CaseSetup;
 use crate::cases::draw_effect::THICKNESS_TOLERANCE;
 use crate::cases::effect_strength::{RefitTerms, unexplained_rms_n};
 use crate::cases::rich_world_effects;

@@ -1,6 +1,6 @@
 //! (a1) The friction estimates of the three isinglass phantoms do not overlap.
 
-use super::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
+use super::claim_definition::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
 use crate::effect_size::{Bar, Measured, Part, Scale};
 use crate::friction_estimates::{MOTIONS, Method, PHANTOMS, estimates};
 use crate::study_conditions::View;

@@ -1,6 +1,6 @@
 //! (b1, b2) Friction estimated online, and in sinusoidal motion, is slightly lower.
 
-use super::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
+use super::claim_definition::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
 use crate::effect_size::{Bar, Measured, Part, Scale};
 use crate::friction_estimates::{MOTIONS, Method, PHANTOMS, estimates, over};
 use crate::study_conditions::View;

@@ -1,7 +1,7 @@
 //! (c1) Behind the layer the multi-layer model's enhanced force is nearer to zero than Kelvin-Voigt's; (c2) on
 //! the liver the multi-layer model renders the elastic part better.
 
-use super::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
+use super::claim_definition::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
 use crate::algorithm_variant::{Ablation, Sensor};
 use crate::assumed_value_changes::Number;
 use crate::effect_size::{Bar, Measured, Part, Scale};

@@ -1,6 +1,6 @@
 //! (d) Kelvin-Voigt over-compensates on 25 % isinglass in sinusoidal motion.
 
-use super::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
+use super::claim_definition::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
 use crate::effect_size::{Bar, Measured, Part, Scale};
 use crate::paper_experiments::Case;
 use crate::study_conditions::View;

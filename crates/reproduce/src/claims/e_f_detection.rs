@@ -1,7 +1,7 @@
 //! (e) The three ruptures of the latex stack are found in constant and in sinusoidal motion; (f1) the two of
 //! liver and of abdomen are, with either sensor.
 
-use super::{Definition, protocol};
+use super::claim_definition::{Definition, protocol};
 use crate::algorithm_variant::{Ablation, Sensor, Setup};
 use crate::assumed_value_changes::Number;
 use crate::effect_size::{Bar, Measured, Part, Scale};

@@ -1,6 +1,6 @@
 //! (g) Resetting the covariance only at ruptures reconstructs the force poorly.
 
-use super::{Definition, KNOWN, PUBLISHED, known, protocol, published};
+use super::claim_definition::{Definition, KNOWN, PUBLISHED, known, protocol, published};
 use crate::algorithm_variant::Ablation;
 use crate::assumed_value_changes::Number;
 use crate::effect_size::{Bar, Measured, Part, Scale};

@@ -1,8 +1,8 @@
 //! (h1) 40 Hz without re-weighting reconstructs much better than resets only at ruptures; (h2) it compensates
 //! little.
 
+use super::claim_definition::{Definition, KNOWN, PUBLISHED, known, protocol, published};
 use super::g_only_ruptures::NUMBERS;
-use super::{Definition, KNOWN, PUBLISHED, known, protocol, published};
 use crate::algorithm_variant::Ablation;
 use crate::effect_size::{Bar, Measured, Part, Scale};
 use crate::paper_experiments::Case;

@@ -1,6 +1,6 @@
 //! (i) Resetting at a constant frequency and when the uncertainty falls below a threshold are equivalent.
 
-use super::{Definition, protocol};
+use super::claim_definition::{Definition, protocol};
 use crate::algorithm_variant::Ablation;
 use crate::assumed_value_changes::Number;
 use crate::effect_size::{Bar, Measured, Part, Scale};

@@ -5,7 +5,7 @@
 //! parameters `Lambda` times the other's. With weights that are powers of two floating-point arithmetic scales
 //! without rounding, so that the identity must hold bit for bit; with the paper's weights up to rounding.
 
-use super::{Definition, protocol};
+use super::claim_definition::{Definition, protocol};
 use crate::all_runs::NOISE_MN;
 use crate::effect_size::{Bar, Measured, Part, Scale};
 use crate::paper_experiments::Case;

@@ -1,6 +1,6 @@
-//! Why a verdict is what it is, in words made of the conditions.
+//! The reason of a verdict as text, composed from the conditions.
 
-use super::{Condition, Primary};
+use super::claim::{Condition, Primary};
 use crate::claim_verdict::Trial;
 use crate::effect_size::Says;
 use std::fmt::Write as _;
@@ -10,7 +10,7 @@ fn list<'a>(conditions: impl Iterator<Item = &'a Condition>) -> String {
     conditions.map(|c| format!("{} {}", c.name, c.effect.words())).collect::<Vec<_>>().join("; ")
 }
 
-/// From the primary condition, the numbers of ours and the sensitivity conditions.
+/// Composes the reason from the primary condition, the changes of assumed values and the sensitivity conditions.
 pub(super) fn reason(primary: &Primary, trials: &[Trial], sensitivities: &[Condition]) -> String {
     let bar = primary.bar.words();
     let says = match (primary.says, primary.effect.interval.is_some()) {

@@ -1,7 +1,8 @@
 //! S Figs 10-15: covariance reset only at ruptures, and 40 Hz without re-weighting.
 
+use super::figure::{Draw, Figure};
 use super::insertion_panels::{Run, coefficients, force, picture};
-use super::{Draw, Figure, supplement_comparison};
+use super::supplement_comparison;
 use crate::algorithm_variant::{Ablation, Sensor, Setup, Variant};
 use crate::all_runs::{NOISE_MN, ReproduceError, Study};
 use crate::paper_experiments::Case;

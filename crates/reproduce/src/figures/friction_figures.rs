@@ -1,6 +1,7 @@
 //! S Fig. 2 and M Table I: the twelve friction estimates.
 
-use super::{Figure, supplement_comparison};
+use super::figure::Figure;
+use super::supplement_comparison;
 use crate::algorithm_variant::Setup;
 use crate::all_runs::Study;
 use crate::friction_estimates::{MOTIONS, Method, PHANTOMS, estimates, over, true_friction};

@@ -1,9 +1,9 @@
 //! S Figs 3-9 and M Figs 12-14: measured, predicted and enhanced force, and the coefficients. Figs 3 to 6 as
 //! captioned, with unknown layer depth, and next to it with known depth.
 
+use super::figure::{Draw, Figure};
 use super::insertion_panels::{Run, coefficients, force, picture, visited};
 use super::supplement_comparison::{self, Facts, Statement};
-use super::{Draw, Figure};
 use crate::algorithm_variant::{Ablation, Sensor, Setup, Variant};
 use crate::all_runs::{NOISE_MN, ReproduceError, Study};
 use crate::paper_experiments::Case;

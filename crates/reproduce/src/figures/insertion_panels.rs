@@ -1,6 +1,6 @@
 //! The panels of an insertion: force above, coefficients below, over one time axis.
 
-use super::Draw;
+use super::figure::Draw;
 use crate::algorithm_variant::Variant;
 use crate::simulated_insertion::Insertion;
 use stylet_core::State;

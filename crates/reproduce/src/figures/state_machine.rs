@@ -1,6 +1,7 @@
 //! S Fig. 1: the state machine, drawn from the core's own table of transitions.
 
-use super::{Figure, supplement_comparison};
+use super::figure::Figure;
+use super::supplement_comparison;
 use crate::value_source::{Class, Sourced};
 use stylet_core::config::DerivativeSense;
 use stylet_core::{EnhanceConfig, State, TRANSITIONS};
