@@ -104,7 +104,7 @@ fn every_constant_of_the_diagnosis_stands_in_the_table_with_its_value_and_reason
         *kinds.entry(kind.clone()).or_default() += 1;
         if ["definition", "prior", "effort"].contains(&kind.as_str()) {
             choices += 1;
-            of_sets += usize::from(place.starts_with("diagnose/src/set/"));
+            of_sets += usize::from(place.starts_with("diagnose/src/repeated_insertions/"));
         }
         documented.insert((place.clone(), name.clone()), value.clone());
     }
