@@ -16,13 +16,14 @@ parser.add_argument("--count", type=int, default=40)
 parser.add_argument("--root", default=os.path.join(os.path.dirname(os.path.abspath(__file__)), ".."))
 parser.add_argument("--answers", action="store_true")
 a = parser.parse_args()
+a.root = os.path.realpath(a.root)
 paths = []
 crates = os.path.join(a.root, "crates")
 for crate in sorted(os.listdir(crates)):
     for base, folders, files in os.walk(os.path.join(crates, crate, "src")):
         folders.sort()
         for f in sorted(files):
-            if f.endswith(".rs") and f not in ("lib.rs", "main.rs", "tests.rs") and "tests" not in base.split(os.sep):
+            if f.endswith(".rs") and f not in ("lib.rs", "main.rs", "tests.rs") and "tests" not in os.path.relpath(base, a.root).split(os.sep):
                 paths.append(os.path.relpath(os.path.join(base, f), a.root))
 paths.sort()
 for n, path in enumerate(sorted(random.Random(a.seed).sample(paths, a.count)), 1):
