@@ -11,7 +11,7 @@
 //! | [`cases`] | what is drawn: stacks, motions, effects, what is wrong and how much of it |
 //! | [`scoring`] | which answers are right, and the table |
 //! | [`challenge_export`] | cases for others, and judging their answers |
-//! | [`examination_plan`], [`run_cases`](mod@run) | which cases, and running an engine on them |
+//! | [`examination_plan`], [`mod@run_cases`] | which cases, and running an engine on them |
 #![forbid(unsafe_code)]
 
 pub mod cases;
