@@ -5,24 +5,13 @@
 //! [`Answer`] (`diagnosis.json` as plain data). It does not see the truth, and this crate knows nothing about
 //! it: of the crates of this project it depends on those of columns and statistics alone (`record`, `stats`).
 //!
-//! ```
-//! use stylet_examine::{Answer, Hide, Plan, run, table};
-//!
-//! let plan = Plan { cases: 3, ..Plan::default() };
-//! // An engine that never finds anything.
-//! let outcomes = run(&plan.cases(), None, &|_question| Ok(Answer::none()), &|_, _| {})?;
-//! assert!(outcomes.iter().filter(|o| o.id.hide == Hide::Clean).all(|o| o.worth.right));
-//! println!("{}", table::text(&outcomes));
-//! # Ok::<(), stylet_examine::RunError>(())
-//! ```
-//!
 //! | module | what lives there |
 //! |---|---|
 //! | [`simulator`] | tissue, needle and sensor, written from the page |
 //! | [`cases`] | what is drawn: stacks, motions, effects, what is wrong and how much of it |
 //! | [`scoring`] | which answers are right, and the table |
 //! | [`challenge_export`] | cases for others, and judging their answers |
-//! | [`examination_plan`], [`run_cases`](mod@run) | which cases, and running an engine on them |
+//! | [`examination_plan`], [`mod@run_cases`] | which cases, and running an engine on them |
 #![forbid(unsafe_code)]
 
 pub mod cases;
@@ -41,3 +30,8 @@ pub use run_cases::{RunError, run_cases};
 pub use scoring::case_outcome::CaseOutcome;
 pub use scoring::diagnosis_answer::{Answer, Verdict};
 pub use scoring::results_table;
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;

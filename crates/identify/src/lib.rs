@@ -41,3 +41,8 @@ pub mod score_test;
 #[cfg(test)]
 mod test_support;
 pub mod update_event_times;
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;

@@ -38,3 +38,8 @@ pub use insertion_plan::{Plan, plan};
 pub use limits::Limits;
 pub use simulation_check::check_by_simulation;
 pub use starting_information::{from_diagnosis, from_scenario};
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;

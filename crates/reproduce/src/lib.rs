@@ -80,3 +80,8 @@ pub fn reproduce(plan: &Plan, done: &(dyn Fn() + Sync)) -> Result<Reproduction, 
     pictures.extend(files);
     Ok(Reproduction { html, claims, claims_json, switches_json, pictures })
 }
+
+/// Compiles the examples of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadmeExamples;
