@@ -14,7 +14,7 @@
 //! | [`confidence_intervals`] | intervals of all parameters |
 //! | [`residual_tests`] | structure in the residual: the verdict `unknown` |
 //! | [`held_out`], [`negligible_effects`] | improvement on held-out recordings, and effects too small to matter |
-//! | [`predict`] | predictions of new recordings |
+//! | [`prediction`] | predictions of new recordings |
 //! | [`diagnosis_json`], [`report_curves`] | results, and the data for the report |
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]

@@ -57,7 +57,7 @@ pub(super) fn misfit_chart(d: &Diagnosis, c: &RecordingCurves, name: &str) -> Ch
         )
         .group(name)
         .height(260)
-        .with_series(line("base law, re-fitted", Colour::Vermillion, &c.base_residual_n).width(1.2))
+        .with_series(line("base law", Colour::Vermillion, &c.base_residual_n).width(1.2))
         .with_series(line("extended model", Colour::Blue, &c.extended_residual_n).width(1.0))
         .with_level(Level::dotted(2.0 * d.noise.sd_n, "twice the noise of a single sample"))
         .with_level(Level::dotted(-2.0 * d.noise.sd_n, ""))
