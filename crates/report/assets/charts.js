@@ -2,6 +2,12 @@
 const views = [];
 const groups = new Map();
 
+// Labels of a linear axis; the library's own keep three decimals, which makes neighbours of small values equal.
+function tickLabels(u, splits) {
+  const small = Math.max(...splits.map(Math.abs)) < 0.1;
+  return splits.map(v => (v === null ? "" : small ? shortNumber(v) : uPlot.fmtNum(v)));
+}
+
 function finiteExtent(values, from, to, accept) {
   let low = Infinity, high = -Infinity;
   for (let i = from; i < to; i++) {
@@ -122,9 +128,9 @@ function options(view) {
   return {
     width: Math.max(240, view.plot.clientWidth), height: spec.height, legend: { show: false }, padding: [8, 14, 0, 0], cursor,
     scales: { x: { time: false, auto: false, range: keep }, y }, series: [{}],
-    axes: [axis(spec.x, { size: 30, space: 60 }),
+    axes: [axis(spec.x, { size: 30, space: 60, values: tickLabels }),
       axis(lanes ? "" : spec.y, { scale: "y", size: 52, space: spec.height < 180 ? 24 : 32, grid: lanes ? { show: false } : axis().grid,
-        labelSize: lanes ? 18 : 18, values: lanes ? () => [] : distr === 1 ? undefined : (u, splits) => splits.map(v => v === null ? "" : shortNumber(v)),
+        labelSize: lanes ? 18 : 18, values: lanes ? () => [] : distr === 1 ? tickLabels : (u, splits) => splits.map(v => v === null ? "" : shortNumber(v)),
         splits: distr === 4 ? u => asinhSplits(u, spec.linearBelow) : undefined, filter: distr === 4 ? (u, splits) => splits : undefined })],
     hooks: {
       drawClear: [u => { if (spec.bands.length) { u.ctx.save(); clipToPlot(u); drawBands(view); u.ctx.restore(); } }],
