@@ -49,20 +49,22 @@ fn a_closed_pipe_changes_no_exit_code_and_a_full_disk_is_reported() {
     let (out, svg) = (text(&scratch.path().join("out")), text(&scratch.path().join("map.svg")));
     let swept = text(&scratch.path().join("swept"));
     let (csv, replayed) = (format!("{out}/recording.csv"), text(&scratch.path().join("trial")));
+    let [compared, enhanced, diagnosed] =
+        ["compared", "enhanced", "diagnosed"].map(|name| text(&scratch.path().join(name)));
     for made in [["run", &gel, "--out", &out, "--quiet"], ["sweep", &sweep, "--out", &swept, "--quiet"]] {
         assert!(stylet(&made).status.success(), "{made:?}");
     }
     let commands: [(&[&str], i32); 11] = [
         (&["effects"], 0),
         (&["run", &gel, "--out", &out], 0),
-        (&["sweep", &sweep, "--out", &out], 0),
+        (&["sweep", &sweep, "--out", &swept], 0),
         (&["sweep", "plan", &sweep, "--shards", "4"], 0),
         (&["sweep", "map", &sweep, "--svg", &svg], 0),
         (&["gate", &holds], 0),
         (&["gate", &fails], 1),
-        (&["compare", &gel, "--seeds", "2", "--out", &out], 0),
-        (&["enhance", &csv, "--out", &replayed], 0),
-        (&["diagnose", &gel, "--data", &csv, "--out", &replayed], 0),
+        (&["compare", &gel, "--seeds", "2", "--out", &compared], 0),
+        (&["enhance", &csv, "--out", &enhanced], 0),
+        (&["diagnose", &gel, "--data", &csv, "--out", &diagnosed], 0),
         (&["replay", &swept, "3", "--out", &replayed], 0),
     ];
     for (command, code) in commands {

@@ -251,7 +251,7 @@ fn every_number_on_the_page_has_its_source_class() {
     // Figs 2 to 15 of the supplement, Table I and Figs 12 to 14 of the main paper; Fig. 1 has no experiment.
     assert_eq!(html.matches("<caption>What went in").count(), 18, "the inputs of the figures");
     assert_eq!(
-        html.matches("<caption>Beside the supplement").count(),
+        html.matches("<caption>Compared with the supplement").count(),
         19,
         "every figure is compared with the supplement"
     );

@@ -15,7 +15,7 @@ fn the_shipped_gates_pass_on_the_committed_baseline_and_on_ten_other_seeds() {
     let output = stylet(&["gate", &gates()]);
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(output.status.success(), "{text}{}", stderr_text(&output));
-    assert!(text.contains("No number differs"), "update the baseline with --update: {text}");
+    assert!(text.contains("No value differs"), "update the baseline with --update: {text}");
     // The bounds were set without these seeds.
     for seed in 21..=30 {
         let output = stylet(&["gate", &gates(), "--seed", &seed.to_string()]);

@@ -3,7 +3,7 @@
 /// Fields and effects in RON files.
 const RON_NAMES: &[(&str, &str)] = &[
     ("LetGo", "ReleaseDepth"),
-    ("let_go", "release_depth"),
+    ("let_go", stylet_tissue::ReleaseDepth::ID),
     ("curve_n_per_m2", "curvature_n_per_m2"),
     ("kept", "retained_share"),
     ("smallest_noise_n", "min_noise_n"),

@@ -58,7 +58,7 @@ pub fn figure_svg(examined: &DiagnosisResult) -> Option<String> {
     let charts = [fit_chart(c, name), misfit_chart(d, c, name)];
     let g = &d.gain;
     let subtitle = format!(
-        "residual {} N before, {} N after; noise {} N",
+        "held-out RMS with predicted rupture times: {} N before, {} N after; noise {} N; below, ruptures at their observed times",
         significant(g.rmse_before_n, 3),
         significant(g.rmse_after_n, 3),
         significant(g.floor_n, 3)
