@@ -228,7 +228,7 @@ fn repeats_without_retraction_are_reported_without_nan() {
     let output =
         stylet(&[&["diagnose", &assumed, "--repeats", "--out", &out, "--data"], &files[..]].concat());
     let stderr_text = flat(&output);
-    assert!(output.status.success() && stderr_text.contains("online core"), "{stderr_text}");
+    assert!(output.status.success() && stderr_text.contains("online algorithm"), "{stderr_text}");
     assert!(!stderr_text.contains("NaN"), "{stderr_text}");
 }
 
