@@ -15,7 +15,7 @@ pub enum LayerStack {
     Six,
 }
 
-/// How much of everything is wrong. [`Amounts::neutral`] is the ordinary world.
+/// How much of everything is wrong. [`MisspecificationAmounts::none`] is the ordinary world.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MisspecificationAmounts {
     /// Thickness, relative.

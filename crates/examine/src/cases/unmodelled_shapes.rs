@@ -32,7 +32,7 @@ pub const UNMODELLED_SHAPES: [&str; 16] = [
 /// One of them with its numbers, and what it remembers.
 #[derive(Clone, Debug)]
 pub struct UnmodelledShape {
-    /// Which of [`SHAPES`].
+    /// Index into [`UNMODELLED_SHAPES`].
     pub kind: usize,
     /// Numbers in 0..1.
     pub u: [f64; 6],

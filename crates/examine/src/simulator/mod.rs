@@ -4,13 +4,13 @@
 //! | module | what lives there |
 //! |---|---|
 //! | [`tissue`] | layers with their true numbers |
-//! | [`motion`] | paths of the needle's base, pieces with known borders |
+//! | [`motion_path`] | motions of the needle's base, pieces with known borders |
 //! | [`effect`] | the departures from the base law, by id and parameter path |
-//! | [`law`] | what a law has to answer |
-//! | [`plain`] | the base law with all departures, event by event |
-//! | [`rich`] | a law of another form, of which the base law is the neutral case |
-//! | [`sensor`] | from the force at the needle's base to the recorded one |
-//! | [`noise`] | what the sensor adds |
+//! | [`force_law`] | interface of a force law |
+//! | [`plain_world`] | the base law with all effects, event by event |
+//! | [`rich_world`] | a law of another form, which contains the base law |
+//! | [`force_sensor`] | from the force at the needle's base to the recorded one |
+//! | [`sensor_noise`] | noise of the sensor |
 //! | [`insertion`] | one needle going through all of it |
 
 pub mod effect;
