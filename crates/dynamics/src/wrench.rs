@@ -29,7 +29,7 @@ impl Wrench {
         Vector6::new(f.x, f.y, f.z, m.x, m.y, m.z)
     }
 
-    /// The reverse of [`Wrench::stacked`].
+    /// The reverse of [`Wrench::to_vector`].
     pub fn from_vector(v: &Vector6<f64>) -> Self {
         Self { force_n: Vector3::new(v[0], v[1], v[2]), moment_nm: Vector3::new(v[3], v[4], v[5]) }
     }

@@ -1,14 +1,15 @@
-//! The paper, figure by figure and claim by claim: our analogues of the figures of Ferro, Gaz, Anzidei and
-//! Vendittelli (2021) and its supplement, from the shipped scenarios, and a verdict on every claim.
+//! Reproduces the figures of Ferro, Gaz, Anzidei and Vendittelli (2021) and its supplement from the shipped scenarios, and tests each
+//! of the paper's claims.
 //!
-//! - [`case`]: which scenario stands for which experiment; [`variant`]: the ways the algorithm is run, always the
-//!   paper's; [`tuning`]: its detection, tuned within the published range; [`change`]: numbers of ours, halved
-//!   and doubled.
-//! - [`study`]: all runs over all noise seeds, once; [`view`]: the conditions under which they are looked at.
-//! - [`protocol`]: what was written down for each claim before the numbers; [`claims`]: one file per claim;
-//!   [`effect`], [`interval`] and [`verdict`]: the rule that makes a verdict of numbers.
-//! - [`source`]: whose each number is; [`chosen`]: the verdicts that hang on ours; [`switches`]: the algorithm's.
-//! - [`figures`]: one file per group; [`truth`]: K and b against the truth; [`page`]: all together.
+//! - [`paper_experiments`]: the scenario of each experiment; [`algorithm_variant`]: variants of the paper's algorithm;
+//!   [`detection_tuning`]: its detection, tuned within the published range; [`assumed_value_changes`]: values that the paper does not
+//!   give, halved and doubled.
+//! - [`all_runs`]: all runs over all noise seeds, once; [`study_conditions`]: the conditions under which they are evaluated.
+//! - [`claim_protocol`]: what was written down for each claim before the numbers; [`claims`]: one file per claim; [`effect_size`],
+//!   [`seed_interval`] and [`claim_verdict`]: from numbers to a verdict.
+//! - [`value_source`]: the source of each number; [`assumed_values`]: verdicts that depend on assumed values; [`algorithm_switches`]:
+//!   what each switch of the algorithm does.
+//! - [`figures`]: one file per group; [`estimates_against_truth`]: K and b against the truth; [`reproduction_page`]: the page.
 #![forbid(unsafe_code)]
 
 pub mod algorithm_switches;

@@ -42,7 +42,7 @@ impl Distribution {
     /// Checks the parameters; `path` is the path of the field for the error.
     ///
     /// # Errors
-    /// [`Problem`] that names the valid range.
+    /// [`FieldError`] that names the valid range.
     pub fn check(&self, path: &str) -> Result<(), FieldError> {
         let fail = |what: String| Err(FieldError::new(path, what));
         let numbers: Vec<f64> = match self {

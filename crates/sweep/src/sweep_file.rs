@@ -104,7 +104,7 @@ impl Sweep {
     /// A sweep over a loaded scenario.
     ///
     /// # Errors
-    /// [`Problem`] with the path of the field of the sweep that is wrong.
+    /// [`FieldError`] with the path of the field of the sweep that is wrong.
     pub fn new(name: String, file: SweepFile, scenario: Scenario) -> Result<Self, FieldError> {
         if file.trials == 0 || file.trials > MAX_TRIALS {
             let what = format!("is {}; it must lie between 1 and {MAX_TRIALS}", file.trials);

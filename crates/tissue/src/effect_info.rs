@@ -126,7 +126,7 @@ pub struct ParameterInfo {
 
 impl ParameterInfo {
     /// How the parameter enters a fit: strengths unchanged, so that a fit may shrink them to zero, shapes by their logarithm
-    /// where [`log`](Self::log) is set.
+    /// where `log` is set.
     #[must_use]
     pub fn fit_scale(&self) -> FitScale {
         match (self.strength, self.inactive == f64::INFINITY) {

@@ -1,17 +1,17 @@
-//! What was there and what was measured, written from the page (docs/reference/model.md) without any other crate of ours
-//! but the recording's columns.
+//! Simulator of tissue, needle and sensor, written from docs/reference/model.md without any other crate of this project
+//! but the recording type.
 //!
-//! | module | what lives there |
+//! | module | contents |
 //! |---|---|
-//! | [`tissue`] | layers with their true numbers |
+//! | [`tissue`] | layers with their true parameters |
 //! | [`motion_path`] | motions of the needle's base, pieces with known borders |
-//! | [`effect`] | the departures from the base law, by id and parameter path |
+//! | [`effect`] | effects, by id and parameter path |
 //! | [`force_law`] | interface of a force law |
 //! | [`plain_world`] | the base law with all effects, event by event |
 //! | [`rich_world`] | a law of another form, which contains the base law |
 //! | [`force_sensor`] | from the force at the needle's base to the recorded one |
 //! | [`sensor_noise`] | noise of the sensor |
-//! | [`insertion`] | one needle going through all of it |
+//! | [`insertion`] | one simulated insertion |
 
 pub mod effect;
 pub mod force_law;
