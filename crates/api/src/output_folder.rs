@@ -272,7 +272,7 @@ pub fn recover_parent(file: &Path) -> Result<(), Error> {
 /// Checks files against the folder's manifest; a folder without manifest passes.
 ///
 /// # Errors
-/// [`Error::NotOneSet`] naming the first file that is not, or a manifest that cannot be read.
+/// [`Error::InconsistentSet`] naming the first file that is not, or a manifest that cannot be read.
 pub fn verify_manifest(folder: &Path, names: &[&str]) -> Result<(), Error> {
     let path = folder.join(MANIFEST);
     let text = match fs::read(&path) {

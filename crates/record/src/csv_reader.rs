@@ -30,7 +30,7 @@ pub struct ReadOptions {
 /// ignored. The delimiter is a comma, a semicolon, a tab or a `|`; a byte order mark, CRLF line ends, quotation marks, spaces
 /// around names and numbers, blank lines and a last line without its end are accepted. Without a velocity column the
 /// position is differentiated ([`mod@crate::differentiate`]). MCAP, MATLAB v7.3 and Parquet files are recognised by their first
-/// bytes ([`mod@crate::foreign`]).
+/// bytes ([`mod@crate::file_formats`]).
 ///
 /// The notes are those of [`assess`], preceded by the repaired rows.
 ///

@@ -116,7 +116,7 @@ impl DiskTableWriter {
     }
 }
 
-/// A table of numbers on disk, column by column in blocks of [`BLOCK`] rows.
+/// A table of numbers on disk, column by column in blocks of [`BLOCK_ROWS`] rows.
 #[derive(Debug)]
 pub struct DiskTable {
     file: TempFile,

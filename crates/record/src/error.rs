@@ -6,7 +6,7 @@ use std::path::PathBuf;
 /// Why a recording cannot be read, built or written.
 ///
 /// Each message names the file, the line (1-based, as an editor counts) and the column where these exist, and ends with
-/// the remedy. All variants but [`RecordError::Write`] and [`RecordError::Scratch`] mean that the input is wrong.
+/// the remedy. All variants but [`RecordError::Write`] and [`RecordError::TemporaryFile`] mean that the input is wrong.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 #[allow(missing_docs)] // the message is the documentation of its fields

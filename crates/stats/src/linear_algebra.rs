@@ -67,7 +67,7 @@ impl SymmetricMatrix {
     }
 }
 
-/// Cholesky factor of a [`Symmetric`].
+/// Cholesky factor of a [`SymmetricMatrix`].
 #[derive(Clone, Debug)]
 pub struct CholeskyFactor {
     size: usize,

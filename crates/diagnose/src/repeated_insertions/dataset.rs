@@ -179,7 +179,7 @@ impl Dataset {
     }
 
     /// Reads recordings of a tissue with `layers` layers. Each is assessed by itself and against the others
-    /// ([`stylet_record::assess`], [`find_outlier_recordings`](stylet_record::find_outlier_recordings)).
+    /// ([`stylet_record::assess`], [`find_outlier_recordings`]).
     ///
     /// # Errors
     ///

@@ -29,7 +29,7 @@ pub struct SegmentedRecording {
     pub stroke_m: f64,
     /// Position (m) where the force leaves zero.
     pub contact_m: f64,
-    /// Rupture time (s) per layer, [`NO_RUPTURE`](stylet_identify::model::NO_RUPTURE) where the force shows none.
+    /// Rupture time (s) per layer, [`NO_RUPTURE`] where the force shows none.
     pub ruptures_s: Vec<f64>,
     /// Force (N) just before the rupture, per layer.
     pub loads_n: Vec<Option<f64>>,
