@@ -12,9 +12,7 @@ use std::str::from_utf8;
 use stylet::{Diagnosis, DiagnosisInputs, Limits, NamedRecording};
 use stylet_examine::challenge_export::AnswerKey;
 use stylet_examine::{Answer, CaseOutcome, Plan};
-use stylet_record::{
-    ColumnMap, ReadOptions, Recording, Truth, assess, read_csv_bytes, read_csv_skip_nonfinite,
-};
+use stylet_record::{ColumnMap, ReadOptions, Recording, Truth, assess, read_csv, read_csv_bytes};
 use stylet_scenario::{EnhancerConfigFile, Motion, Scenario, motion_to_ron, parse};
 use stylet_sweep::score_gate::{Baseline, GatesFile};
 use stylet_sweep::shard::{self, ShardNumber};
@@ -263,7 +261,7 @@ fn files_written_by_stylet_are_read_again_or_refused() {
     fuzz_any("holes", (2_000, Target::Text), &[rows(","), rows(";"), rows("\t"), rows("|")], |bytes| {
         let options = ReadOptions { columns: None, repair: false };
         std::fs::write(&csv, bytes).is_ok()
-            && read_csv_skip_nonfinite(&csv, &options).is_ok_and(|(recording, _)| recording.check().is_ok())
+            && read_csv(&csv, &options).is_ok_and(|(recording, _)| recording.check().is_ok())
     });
     let set = r#"Dataset(name: "two", recordings: ["two.csv"], split_by: ["specimen"],
         tissue: (layers: [(thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]))"#;

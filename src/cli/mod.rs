@@ -9,6 +9,7 @@ mod diagnose_repeats;
 mod effects;
 mod enhance;
 mod exit_codes;
+mod inspect;
 mod listen;
 mod output_args;
 mod plan;
@@ -20,6 +21,7 @@ mod run;
 mod scorecard;
 mod sweep;
 mod terminal_output;
+mod text_plot;
 
 use args::{Cli, Command};
 use clap::Parser;
@@ -54,6 +56,7 @@ pub fn main() -> ExitCode {
     let outcome = std::panic::catch_unwind(|| match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Enhance(args) => enhance::enhance(args),
+        Command::Inspect(args) => inspect::inspect(args),
         Command::Convert(args) => convert::convert(args),
         Command::Sweep(args) => sweep::sweep(args),
         Command::Replay(args) => sweep::replay(args),

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use stylet_diagnose::NamedRecording;
-use stylet_record::{ReadOptions, read_csv_skip_nonfinite};
+use stylet_record::ReadOptions;
 
 /// Inputs of a diagnosis, as `inputs.json` holds them.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -90,7 +90,7 @@ pub fn read_options(columns: Option<&Path>, repair: bool) -> Result<ReadOptions,
 /// # Errors
 /// [`Error::Recording`] with file and line.
 pub fn read_recordings(data: &[PathBuf], options: &ReadOptions) -> Result<Vec<NamedRecording>, Error> {
-    let read: Vec<_> = data.par_iter().map(|path| read_csv_skip_nonfinite(path, options)).collect();
+    let read: Vec<_> = data.par_iter().map(|path| read_csv(path, options)).collect();
     let named = data.iter().zip(read).map(|(path, read)| {
         let (recording, notes) = read?;
         Ok(NamedRecording { name: recording_name(path, data), recording, notes })

@@ -20,7 +20,7 @@ use stylet_diagnose::repeated_insertions::cross_validation::{
 use stylet_diagnose::repeated_insertions::multistart_fit::{draw_starts, multistart_fit};
 use stylet_diagnose::repeated_insertions::{SegmentedRecording, segmented_recording, stick_slip_fit};
 use stylet_record::sensor_artefacts::SensorArtefacts;
-use stylet_record::{ColumnMap, ReadOptions, read_csv_skip_nonfinite};
+use stylet_record::{ColumnMap, ReadOptions, read_csv};
 
 /// Seed of the start values.
 const SEED: u64 = 15;
@@ -56,7 +56,7 @@ fn read(folder: &Path, name: &str, layers: usize) -> Result<Vec<SegmentedRecordi
     let mut out = Vec::new();
     for file in files {
         let name = file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        out.push(SegmentedRecording::new(name, read_csv_skip_nonfinite(&file, &options)?.0, layers));
+        out.push(SegmentedRecording::new(name, read_csv(&file, &options)?.0, layers));
     }
     Ok(out)
 }

@@ -7,7 +7,7 @@ use crate::work::run_in_background;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use std::path::PathBuf;
-use stylet::record::read_csv_skip_nonfinite;
+use stylet::record::read_csv;
 use stylet::{DiagnosisReport, NamedRecording, ReadOptions, Scenario};
 
 /// One recording: a file, or a name with time, position, force and velocity (or none).
@@ -85,7 +85,7 @@ pub fn to_recordings(
     for one in measured {
         recordings.push(match one {
             Measured::File(path) => {
-                let (recording, notes) = read_csv_skip_nonfinite(path, &options).map_err(failure)?;
+                let (recording, notes) = read_csv(path, &options).map_err(failure)?;
                 NamedRecording { name: stylet::recording_name(path, &files), recording, notes }
             }
             Measured::Columns(name, time_s, position_m, force_n, velocity_mps) => NamedRecording {

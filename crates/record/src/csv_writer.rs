@@ -2,7 +2,7 @@
 
 use std::io::{self, BufWriter, Write};
 
-use crate::csv_header::joint_torque_name;
+use crate::columns::joint_torque_name;
 use crate::error::RecordError;
 use crate::ground_truth::Truth;
 use crate::recording::{JOINTS, Recording, check_length};

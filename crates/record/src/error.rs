@@ -31,8 +31,8 @@ pub enum RecordError {
     #[error("{}: line {line} is a header and no row follows; a recording has at least 2 rows of numbers", path.display())]
     HeaderOnly { path: PathBuf, line: u64 },
 
-    /// Not UTF-8, or with zero bytes.
-    #[error("{}: not a text file in UTF-8: {what} at byte {byte} (line {line}); export the data as CSV text in UTF-8", path.display())]
+    /// Neither text nor a known format.
+    #[error("{}: not a text file and of no known format: {what} at byte {byte} (line {line}); export the data as CSV text", path.display())]
     NotText { path: PathBuf, byte: usize, line: u64, what: &'static str },
 
     /// A file of another program cannot be read.
@@ -53,12 +53,37 @@ pub enum RecordError {
         suggestion: Option<String>,
     },
 
-    /// Numbers instead of column names.
+    /// Numbers without column names.
     #[error(
-        "{}: line {line}: the header is missing: the first line holds the numbers {}; begin the file with a line of names such as time_s,position_m,force_n",
-        path.display(), list(found)
+        "{}: line {line}: the header is missing: no line of names stands above the {columns} columns of numbers; give the columns by \
+         number in a column map, such as time: (column: 1), or begin the file with a line of names such as time_s,position_m,force_n",
+        path.display()
     )]
-    NoHeader { path: PathBuf, line: u64, found: Vec<String> },
+    NoHeader { path: PathBuf, line: u64, columns: usize },
+
+    /// No rows of numbers.
+    #[error("{}: no table: from line {line} on there are no rows of numbers; export the samples as a table, one row per sample", path.display())]
+    NoTable { path: PathBuf, line: u64 },
+
+    /// A comma that may be a decimal sign or a separator of thousands.
+    #[error(
+        "{}: line {line}: nothing decides whether the comma in {text:?} is a decimal sign or separates thousands; give it in a column map, \
+         decimal: ',' or decimal: '.'",
+        path.display()
+    )]
+    OpenDecimal { path: PathBuf, line: u64, text: String },
+
+    /// A column number that the file lacks.
+    #[error("{}: line {line}: there is no column {number}; the file has {columns} columns", path.display())]
+    NoSuchColumn { path: PathBuf, line: u64, number: usize, columns: usize },
+
+    /// Several columns may hold a quantity.
+    #[error(
+        "{}: line {line}: several columns may hold the {what}: {}; name one in a column map, {field}: (name: ...), or three components \
+         with names: [...]",
+        path.display(), list(columns)
+    )]
+    SeveralColumns { path: PathBuf, line: u64, what: &'static str, field: &'static str, columns: Vec<String> },
 
     /// The name of a required column occurs more than once.
     #[error("{}: line {line}: the header names the column \"{column}\" twice; rename the one that is not meant", path.display())]
@@ -94,24 +119,75 @@ pub enum RecordError {
 
     /// Time runs backward.
     #[error(
-        "{}: line {line}, column \"{column}\": time runs backward, {time_s} s after {previous_s} s on line {previous_line}; time must increase from row to row: split a file that holds several runs, or drop such rows with --repair",
+        "{}: line {line}: time runs backward, {time_s} s after {previous_s} s on line {previous_line}; time must increase from row to \
+         row: repair single stamps with --repair",
         path.display()
     )]
-    BackwardTime {
-        path: PathBuf,
-        line: u64,
-        column: String,
-        time_s: f64,
-        previous_s: f64,
-        previous_line: u64,
-    },
+    BackwardTime { path: PathBuf, line: u64, time_s: f64, previous_s: f64, previous_line: u64 },
 
     /// Two rows with the same time.
     #[error(
-        "{}: line {line}, column \"{column}\": the time stamp {time_s} s repeats that of line {previous_line}; time must increase from row to row: drop such rows with --repair",
+        "{}: line {line}: the time stamp {time_s} s repeats that of line {previous_line}; time must increase from row to row: repair \
+         single stamps with --repair",
         path.display()
     )]
-    RepeatedTime { path: PathBuf, line: u64, column: String, time_s: f64, previous_line: u64 },
+    RepeatedTime { path: PathBuf, line: u64, time_s: f64, previous_line: u64 },
+
+    /// Many rows with the same time.
+    #[error(
+        "{}: line {line}: the samples arrive in bursts, {rows} rows with {stamps} different time stamps; --repair spreads them evenly, or \
+         give the sampling rate in a column map, rate_hz",
+        path.display()
+    )]
+    Bursts { path: PathBuf, line: u64, rows: usize, stamps: usize },
+
+    /// A second recording in the same file.
+    #[error(
+        "{}: line {line}: a second recording begins here, time falls from {previous_s} s to {time_s} s; put the lines from {line} on into \
+         a file of their own",
+        path.display()
+    )]
+    SecondRun { path: PathBuf, line: u64, time_s: f64, previous_s: f64 },
+
+    /// A repair would drop too many rows.
+    #[error(
+        "{}: line {line}: --repair would drop {dropped} of {rows} rows whose time stamps run backward or repeat, from this line on, and drops at \
+         most 1 %; correct the time stamps, cut the file there, or give the sampling rate in a column map, rate_hz",
+        path.display()
+    )]
+    RepairTooMuch { path: PathBuf, line: u64, dropped: usize, rows: usize },
+
+    /// The time is a sample number.
+    #[error(
+        "{}: line {line}: the time \"{column}\" counts the samples, 1 per row; give the sampling rate in a column map, rate_hz: 200, or \
+         time: (name: ..., scale: 1) if it is really one sample per second",
+        path.display()
+    )]
+    SampleNumber { path: PathBuf, line: u64, column: String },
+
+    /// A time that no clock in this unit shows.
+    #[error(
+        "{}: line {line}: the time \"{column}\" begins at {value:e}: these are {unit} since 1970, not seconds; give a column map with \
+         time: (name: ..., scale: {scale:e})",
+        path.display()
+    )]
+    TimeUnit { path: PathBuf, line: u64, column: String, value: f64, unit: &'static str, scale: f64 },
+
+    /// Two files without common time.
+    #[error(
+        "{}: its time, {} s to {} s, has no part in common with that of {}, {} s to {} s; record both with the same clock, or shift one \
+         by time.offset",
+        path.display(), own.0, own.1, other_path.display(), other.0, other.1
+    )]
+    NoOverlap { path: PathBuf, own: (f64, f64), other_path: PathBuf, other: (f64, f64) },
+
+    /// A field of a column map is wrong.
+    #[error("column map: {field} must be {must_be}")]
+    BadMapField { field: &'static str, must_be: &'static str },
+
+    /// An error with further obstacles and the command that helps.
+    #[error("{first}{}\nlook at the file with: stylet inspect {} --write-map map.ron", also(others), path.display())]
+    Refused { first: Box<RecordError>, others: Vec<String>, path: PathBuf },
 
     /// Too short to have a velocity.
     #[error("{}: {samples} sample(s) by line {line}; a recording needs at least 2 samples with different time stamps", path.display())]
@@ -176,6 +252,17 @@ pub enum RecordError {
     /// The destination cannot be written.
     #[error("the recording cannot be written ({0}); check that the destination exists and has room")]
     Write(#[from] io::Error),
+}
+
+/// Further obstacles, one per line.
+fn also(others: &[String]) -> String {
+    let mut text = String::new();
+    for (at, other) in others.iter().enumerate() {
+        text.push_str(if at == 0 { "\nfurther obstacles:" } else { "" });
+        text.push_str("\n  ");
+        text.push_str(other);
+    }
+    text
 }
 
 /// Introduction to the list of refused recordings; empty for a single one.

@@ -23,17 +23,19 @@
 //! | [`ground_truth`] | [`Truth`]: ground truth of a simulated recording |
 //! | [`column_map`] | [`ColumnMap`]: names, units and signs of the columns of another program's log |
 //! | [`csv_reader`], [`csv_writer`] | CSV in and out, bit for bit |
-//! | [`nonfinite_rows`] | reading CSV files with NaN or infinite values |
+//! | [`mod@inspect`] | what a file holds: layout, columns, sampling, units, a proposed column map |
+//! | [`units`] | units in names and rows of units |
 //! | [`long_recording`], [`disk_table`] | recordings longer than memory, on disk |
-//! | [`file_formats`] | MCAP, MATLAB v7.3 and Parquet (feature `formats`) |
+//! | [`file_formats`] | spreadsheets, MATLAB, HDF5, Parquet, MCAP, ROS 2 bags (most with the feature `formats`) |
 //! | `quality` | [`QualityNote`]s on implausible, saturated, irregular or outlying data |
 //! | [`sensor_artefacts`] | samples that a force law cannot explain: sensor range, resolution, spikes |
 //! | [`mod@downsample`] | averaging of recordings that are too long for a diagnosis |
 //! | [`mod@differentiate`] | velocity from position on irregular time stamps |
 //! | [`error`] | [`RecordError`]: what is wrong, where, and the remedy |
 
+mod assemble;
 pub mod column_map;
-mod csv_header;
+mod columns;
 pub mod csv_reader;
 pub mod csv_writer;
 pub mod differentiate;
@@ -42,14 +44,17 @@ pub mod downsample;
 pub mod error;
 pub mod file_formats;
 pub mod ground_truth;
+mod insertion_axis;
+pub mod inspect;
 pub mod long_recording;
-pub mod nonfinite_rows;
 mod quality;
 pub mod recording;
 mod sample_stream;
 #[cfg(test)]
 mod test_noise;
-mod timestamp_repair;
+mod text;
+mod time_order;
+pub mod units;
 
 pub use column_map::{Column, ColumnMap};
 pub use csv_reader::{ReadOptions, read_csv, read_csv_bytes};
@@ -59,7 +64,6 @@ pub use downsample::downsample;
 pub use error::RecordError;
 pub use ground_truth::{LayerTruth, TrueRupture, Truth};
 pub use long_recording::{LongRecording, read_long_csv};
-pub use nonfinite_rows::read_csv_skip_nonfinite;
 pub use quality::{
     MIN_SAMPLES, QualityKind, QualityNote, assess, check_usable, find_outlier_recordings, sensor_artefacts,
 };

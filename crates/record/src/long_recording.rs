@@ -7,21 +7,31 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use crate::csv_header::{ColumnRole, CsvLayout, joint_torque_name, read_layout};
-use crate::csv_reader::{
-    ReadOptions, SourceFile, TextSource, Utf8Check, check_sample_count, header_start, read_rows,
-};
+use crate::assemble::{check_sample_count, hole_note, unit_notes};
+use crate::columns::{ColumnRole, MappedColumns, Parts, joint_torque_name};
+use crate::csv_reader::{ReadOptions, wanted_fields};
 use crate::differentiate::{DEFAULT_HALF_WIDTH_S, SlopeFilter};
 use crate::disk_table::{BLOCK_ROWS, DiskTable, DiskTableWriter, ExternalSort};
 use crate::error::RecordError;
 use crate::file_formats::FileFormat;
+use crate::inspect::magnitude::epoch_unit;
+use crate::inspect::{InspectOptions, inspect};
 use crate::quality::{QualityNote, assess_stream, repaired_rows};
 use crate::recording::Sample;
 use crate::sample_stream::{Quantity, SampleStream, SortedValues};
-use crate::timestamp_repair::rows_to_drop;
+use crate::text::encoding;
+use crate::text::find::find_table;
+use crate::text::rows::{Tolerance, read_rows};
+use crate::text::source::{SourceFile, TextSource, Utf8Check, header_start};
+use crate::time_order::{check_dropped, rows_to_drop};
+use encoding_rs::{Encoding, UTF_8};
 
-/// Most bytes before the end of the header.
-const HEADER_BYTES: u64 = 1 << 16;
+/// Bytes that decide about encoding and layout.
+const HEAD_BYTES: u64 = 1 << 18;
+/// Lines that a note lists.
+const MAX_LINES: usize = 100;
+/// Share of the rows with a missing value from which on they are read in memory, where rows of different topics are joined.
+const MAX_HOLE_SHARE: f64 = 0.1;
 /// Most consecutive rows out of time order that `--repair` handles, in memory.
 const MAX_DISORDER_ROWS: usize = 1 << 20;
 
@@ -36,10 +46,13 @@ pub struct LongRecording {
     folder: PathBuf,
     /// Lines of rows whose time stamps did not increase.
     dropped_lines: Vec<u64>,
+    /// Notes of reading.
+    notes: Vec<QualityNote>,
 }
 
 /// Reads a recording from a CSV file as [`read_csv`](crate::read_csv) does, into temporary files in `folder`. `None` when the
-/// file cannot be read in pieces (no regular file, another format, a header beyond 64 KB).
+/// file must be read as a whole: no regular file, another format, a header beyond 256 KB, columns of several files or in
+/// components, time stamps in bursts.
 ///
 /// # Errors
 /// Those of [`read_csv`](crate::read_csv), [`RecordError::TemporaryFile`] when the folder cannot be written, and
@@ -49,7 +62,10 @@ pub fn read_long_csv(
     options: &ReadOptions,
     folder: &Path,
 ) -> Result<Option<(LongRecording, Vec<QualityNote>)>, RecordError> {
-    let Some(recording) = LongRecording::read(path, options, folder)? else { return Ok(None) };
+    let read = LongRecording::read(path, options, folder).map_err(|error| {
+        error.with_obstacles(|| inspect(path, &InspectOptions { columns: options.columns.clone() }), path)
+    });
+    let Some(recording) = read? else { return Ok(None) };
     let notes = recording.assess()?;
     Ok(Some((recording, notes)))
 }
@@ -60,16 +76,30 @@ fn header_is_complete(text: &[u8]) -> bool {
     end.is_some_and(|end| text[..end].iter().filter(|byte| **byte == b'"').count().is_multiple_of(2))
 }
 
-fn check_utf8(file_source: &SourceFile<'_>) -> Result<(), RecordError> {
+/// Whether the whole file is UTF-8 without zero bytes.
+fn is_utf8(file_source: &SourceFile<'_>) -> Result<bool, RecordError> {
     let mut text = file_source.text.reader_at(0).map_err(|source| file_source.unreadable(source))?;
     let mut check = Utf8Check::default();
     let mut chunk = vec![0; 1 << 18];
     loop {
         match text.read(&mut chunk).map_err(|source| file_source.unreadable(source))? {
-            0 => return check.finish().map_err(|bad| bad.into_error(file_source)),
-            count => check.push(&chunk[..count]).map_err(|bad| bad.into_error(file_source))?,
+            0 => return Ok(check.finish()),
+            count if check.push(&chunk[..count]) => {}
+            _ => return Ok(false),
         }
     }
+}
+
+/// Whether the columns can be read row by row.
+fn is_simple(columns: &MappedColumns, options: &ReadOptions) -> bool {
+    let single = columns.columns.iter().all(|column| column.parts == Parts::Single);
+    let time_first = columns.columns.first().is_some_and(|column| column.role == ColumnRole::Time);
+    let map = options.columns.as_ref();
+    let files = map.is_some_and(|map| {
+        let optional = map.velocity.iter().chain(&map.force_virtual);
+        [&map.time, &map.position, &map.force].into_iter().chain(optional).any(|column| column.file.is_some())
+    });
+    single && time_first && !files && map.is_none_or(|map| map.rate_hz.is_none())
 }
 
 /// The table without the rows whose time stamps do not increase, and the lines of these.
@@ -113,6 +143,7 @@ fn repaired(
         left.push(numbers)
     });
     moved.map_err(temporary_file_error)?;
+    check_dropped(file_source, &offsets, table.rows())?;
     let lines = file_source.lines_of_offsets(offsets.into_iter())?;
     Ok((left.finish().map_err(temporary_file_error)?, lines))
 }
@@ -132,38 +163,97 @@ impl LongRecording {
             return Ok(None);
         }
         let mut head = Vec::new();
-        (&file).take(HEADER_BYTES).read_to_end(&mut head).map_err(unreadable)?;
-        let Some(header) = header_start(&head).filter(|header| header_is_complete(&head[*header..])) else {
-            return Ok(None);
-        };
+        (&file).take(HEAD_BYTES).read_to_end(&mut head).map_err(unreadable)?;
         if FileFormat::detect(&head).is_some() {
             return Ok(None);
         }
         if let Some(map) = &options.columns {
             map.check()?;
         }
-        let file_source = SourceFile { text: TextSource::File(&file), path, header };
-        check_utf8(&file_source)?;
-        let layout =
-            read_layout(&head[header..], path, file_source.line_of_row(header)?, options.columns.as_ref())?;
-        drop(head);
+        let given =
+            options.columns.as_ref().and_then(|map| Encoding::for_label(map.encoding.as_ref()?.as_bytes()));
+        let Some(encoding) = given.or_else(|| encoding::detect(&head).ok()) else { return Ok(None) };
+        let text =
+            if encoding == UTF_8 { TextSource::File(&file) } else { TextSource::Encoded(&file, encoding) };
+        let head = match encoding == UTF_8 {
+            true => head,
+            false => encoding::decode(&head, encoding),
+        };
+        let head = match std::str::from_utf8(&head) {
+            Ok(head) => head,
+            Err(error) => std::str::from_utf8(&head[..error.valid_up_to()]).unwrap_or_default(),
+        };
+        let Some(header) =
+            header_start(head.as_bytes()).filter(|header| header_is_complete(&head.as_bytes()[*header..]))
+        else {
+            return Ok(None);
+        };
+        let file_source = SourceFile { text, path, header };
+        if !is_utf8(&file_source)? {
+            return Ok(None);
+        }
+        let (layout, columns) =
+            find_table(head, header, file_source.line_of_row(header)?, path, options.columns.as_ref())?;
+        if !is_simple(&columns, options) {
+            return Ok(None);
+        }
         let temporary_file_error = |source| RecordError::TemporaryFile { path: folder.to_owned(), source };
         let mut writer =
-            DiskTableWriter::new(folder, layout.columns.len() + 1).map_err(temporary_file_error)?;
-        let mut row = Vec::new();
-        read_rows(&file_source, &layout, !options.repair, |offset, numbers| {
-            row.clear();
-            row.extend_from_slice(numbers);
-            // An f64 is exact for offsets below 2^53.
-            row.push(offset as f64);
-            writer.push(&row).map_err(temporary_file_error)
-        })?;
+            DiskTableWriter::new(folder, columns.columns.len() + 1).map_err(temporary_file_error)?;
+        let (mut row, mut holes, mut hole_offsets) = (Vec::new(), 0_usize, Vec::new());
+        let (mut in_order, mut counts_samples, mut previous) = (true, true, None);
+        let mut largest_s = 0.0_f64;
+        let read = read_rows(
+            &file_source,
+            &layout,
+            &wanted_fields(&layout, &columns),
+            Tolerance::Strict,
+            |offset, numbers| {
+                row.clear();
+                row.extend(numbers.iter().zip(&columns.columns).map(|(raw, column)| column.apply(*raw)));
+                if row.iter().any(|x| !x.is_finite()) {
+                    holes += 1;
+                    if hole_offsets.len() < MAX_LINES {
+                        hole_offsets.push(offset);
+                    }
+                    return Ok(());
+                }
+                let time_s = row[0];
+                if let Some(previous) = previous.replace(time_s) {
+                    in_order &= time_s > previous;
+                    counts_samples &= time_s - previous == 1.0;
+                }
+                largest_s = largest_s.max(time_s.abs());
+                // An f64 is exact for offsets below 2^53.
+                row.push(offset as f64);
+                writer.push(&row).map_err(temporary_file_error)
+            },
+        )?;
+        // What needs all rows at once, and errors about their order, are those of the reader in memory.
+        let odd_clock = counts_samples
+            || epoch_unit(largest_s).is_some()
+            || read.origins.first().is_some_and(Option::is_some);
+        if odd_clock
+            || (!in_order && !options.repair)
+            || holes as f64 > MAX_HOLE_SHARE * read.rows as f64
+            || read.cut_row.is_some()
+        {
+            return Ok(None);
+        }
+        let mut notes = unit_notes(&columns);
+        if holes > 0 {
+            notes.push(hole_note(&file_source, holes, hole_offsets)?);
+        }
         let table = writer.finish().map_err(temporary_file_error)?;
-        let (table, dropped_lines) = match options.repair {
-            true => repaired(table, &file_source, folder)?,
+        let (table, dropped_lines) = match options.repair && !in_order {
+            true => match repaired(table, &file_source, folder) {
+                // Bursts are spread in memory.
+                Err(RecordError::RepairTooMuch { .. }) => return Ok(None),
+                other => other?,
+            },
             false => (table, Vec::new()),
         };
-        Ok(Some(Self { dropped_lines, ..Self::new(table, &file_source, &layout, folder)? }))
+        Ok(Some(Self { dropped_lines, notes, ..Self::new(table, &file_source, &columns, folder)? }))
     }
 
     /// Quality notes as by [`assess`](crate::assess), preceded by the repaired rows.
@@ -171,23 +261,31 @@ impl LongRecording {
     /// # Errors
     /// [`RecordError::TemporaryFile`].
     pub fn assess(&self) -> Result<Vec<QualityNote>, RecordError> {
-        let mut notes = assess_stream(self)?;
+        let mut notes = Vec::new();
         if !self.dropped_lines.is_empty() {
-            notes.insert(0, repaired_rows(self.dropped_lines.clone(), self.len()));
+            notes.push(repaired_rows(self.dropped_lines.clone(), self.len()));
         }
+        notes.extend(self.notes.iter().cloned());
+        notes.extend(assess_stream(self)?);
         Ok(notes)
     }
 
     fn new(
         table: DiskTable,
         file_source: &SourceFile<'_>,
-        layout: &CsvLayout,
+        columns: &MappedColumns,
         folder: &Path,
     ) -> Result<Self, RecordError> {
-        let roles: Vec<ColumnRole> = layout.columns.iter().map(|source| source.role).collect();
+        let roles: Vec<ColumnRole> = columns.columns.iter().map(|source| source.role).collect();
         let offset_column = roles.len();
-        let mut recording =
-            Self { table, roles, velocity: None, folder: folder.to_owned(), dropped_lines: Vec::new() };
+        let mut recording = Self {
+            table,
+            roles,
+            velocity: None,
+            folder: folder.to_owned(),
+            dropped_lines: Vec::new(),
+            notes: Vec::new(),
+        };
         let last = match recording.table.rows().checked_sub(1) {
             Some(last) => Some(
                 recording.table.value(offset_column, last).map_err(|e| recording.temporary_file_error(e))?

@@ -97,8 +97,12 @@ fn same_result(name: &str, text: &[u8], options: &ReadOptions) -> Result<Vec<Str
     let folder = TempFolder::new(name);
     let path = folder.0.join("log.csv");
     std::fs::write(&path, text).expect("a folder file");
-    let read = read_in_pieces(&path, options, &folder.0).expect("a plain file");
     let expected = read_at_once(&path, options);
+    let Some(read) = read_in_pieces(&path, options, &folder.0) else {
+        // Left to the reader in memory, as every file out of order.
+        assert!(expected.is_err(), "{name}: a good file is read in pieces");
+        return Err(expected.err().unwrap_or_default());
+    };
     match (&read, &expected) {
         (Ok(read), Ok(expected)) => {
             assert_eq!(read.2, expected.2, "{name}: the notes");
@@ -188,8 +192,7 @@ fn dialects_extra_columns_and_maps_give_the_same_result() {
         time: Column::scaled("time_s", 1.0),
         position: Column::scaled("position_m", -1.0),
         force: Column::scaled("force_n", 2.0),
-        velocity: None,
-        force_virtual: None,
+        ..ColumnMap::open()
     };
     good("map", plain.as_bytes(), &ReadOptions { columns: Some(map), repair: false }, &[]);
 }
@@ -206,7 +209,8 @@ fn rows_out_of_order_are_repaired_or_refused_by_both_readers() {
         assert!(same_result("refused", text(&rows, velocity).as_bytes(), &PLAIN).is_err());
     }
     let twice: Vec<[f64; 4]> = [&insertions(20_000)[..], &insertions(17_000)[..]].concat();
-    good("twice", text(&twice, true).as_bytes(), &REPAIR, &["RepairedRows"]);
+    let second = same_result("twice", text(&twice, true).as_bytes(), &REPAIR).expect_err("two recordings");
+    assert!(second.contains("line 20002: a second recording begins here"), "{second}");
     let still = vec![[1.0, 0.0, 0.0, 0.0]; 5];
     assert!(same_result("one time", text(&still, true).as_bytes(), &REPAIR).is_err());
 }
@@ -233,7 +237,6 @@ fn errors_have_the_same_message() {
     let cases: Vec<(&str, Vec<u8>)> = vec![
         ("text", at(16_500, "1,x,2,3")),
         ("comma", at(16_500, "1;5,0,2,3")),
-        ("infinite", at(16_500, "1,inf,2,3")),
         ("ragged", at(16_500, "1,2,3")),
         ("quote", at(16_500, "1,\"2,3,4")),
         ("back", at(16_500, "1,0,2,3")),
@@ -261,7 +264,7 @@ fn errors_have_the_same_message() {
 #[test]
 fn files_that_cannot_be_read_in_pieces_are_left_to_the_other_reader() {
     let folder = TempFolder::new("other");
-    let blank = "\n".repeat(70_000) + &text(&insertions(100), true);
+    let blank = "\n".repeat(300_000) + &text(&insertions(100), true);
     for (name, bytes) in
         [("empty", b"".to_vec()), ("far", blank.into_bytes()), ("parquet", b"PAR1 and so on\n".to_vec())]
     {

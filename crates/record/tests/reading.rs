@@ -57,10 +57,9 @@ fn optional_columns_are_read_when_present() -> Result<(), RecordError> {
 fn a_column_map_converts_a_foreign_log_to_si_units() -> Result<(), RecordError> {
     let map = ColumnMap {
         time: Column::scaled("time", 1e-6),
-        position: Column { name: "pz".to_owned(), scale: -1e-3, offset: 0.25 },
+        position: Column { offset: 0.25, ..Column::scaled("pz", -1e-3) },
         force: Column::si("fz"),
-        velocity: None,
-        force_virtual: None,
+        ..ColumnMap::default()
     };
     let text = b"time,fx,fz,pz,velocity_mps\n0,9,1.5,250,7\n10000,9,2.5,249.98,7\n20000,9,3.5,249.96,7\n";
     let (recording, _) = read_with(text, &ReadOptions { columns: Some(map), repair: false })?;
@@ -74,9 +73,12 @@ fn a_column_map_converts_a_foreign_log_to_si_units() -> Result<(), RecordError> 
 
 #[test]
 fn repair_drops_bad_time_stamps_and_names_their_lines() -> Result<(), RecordError> {
-    let text = b"time_s,position_m,force_n\n\n0,0,1\n0.1,0,2\n0.1,0,99\n\n0.2,0,3\n0.15,0,99\n0.3,0,4\n";
-    let (recording, notes) = read_with(text, &ReadOptions { repair: true, ..ReadOptions::default() })?;
-    assert_eq!(recording.force_n, [1.0, 2.0, 3.0, 4.0]);
+    let mut text =
+        "time_s,position_m,force_n\n\n0,0,1\n0.1,0,2\n0.1,0,99\n\n0.2,0,3\n0.15,0,99\n0.3,0,4\n".to_owned();
+    (4..300).for_each(|k| text += &format!("{},0,5\n", 0.1 * f64::from(k)));
+    let options = ReadOptions { repair: true, ..ReadOptions::default() };
+    let (recording, notes) = read_with(text.as_bytes(), &options)?;
+    assert_eq!(recording.force_n[..5], [1.0, 2.0, 3.0, 4.0, 5.0]);
     assert_eq!(notes[0].kind, QualityKind::RepairedRows);
     assert_eq!(notes[0].lines, [5, 8]);
     assert!(

@@ -100,13 +100,8 @@ fn main() {
     let map = ColumnMap {
         time: Column::scaled("time", 1e-6),
         position: Column::scaled("pz", 1e-3),
-        ..ColumnMap {
-            force: Column::si("fz"),
-            time: Column::si("time"),
-            position: Column::si("pz"),
-            velocity: None,
-            force_virtual: None,
-        }
+        force: Column::si("fz"),
+        ..ColumnMap::open()
     };
     let mut config = EnhanceConfig {
         algorithm: if paper { Algorithm::Paper } else { Algorithm::Stylet },

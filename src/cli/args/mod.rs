@@ -2,6 +2,7 @@
 
 mod benchmark;
 mod diagnosis;
+mod inspect;
 mod recordings;
 mod simulation;
 mod sweep;
@@ -11,6 +12,7 @@ pub use benchmark::{
     BenchmarkScoreArgs,
 };
 pub use diagnosis::{DiagnoseArgs, EffectsArgs, IdentifiabilityArgs, PlanArgs, PredictArgs, RefitArg};
+pub use inspect::InspectArgs;
 pub use recordings::{ConvertArgs, EnhanceArgs, ListenArgs};
 pub use simulation::{AlgorithmArg, CompareArgs, ReproduceArgs, RunArgs};
 pub use sweep::{
@@ -38,6 +40,8 @@ pub enum Command {
     Run(RunArgs),
     /// Run the online algorithm on a measured recording.
     Enhance(EnhanceArgs),
+    /// Look at a recording of any format: layout, columns, units, sampling, what stands in the way; propose a column map.
+    Inspect(InspectArgs),
     /// Convert a recording to CSV, Parquet or MCAP.
     Convert(ConvertArgs),
     /// Simulate thousands of insertions with randomised parameters: failure rates, intervals, sensitivity.

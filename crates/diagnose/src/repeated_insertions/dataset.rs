@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stylet_record::{
     ColumnMap, QualityKind, QualityNote, ReadOptions, RecordError, Recording, check_usable,
-    find_outlier_recordings, read_csv_bytes, read_csv_skip_nonfinite,
+    find_outlier_recordings, read_csv, read_csv_bytes,
 };
 use stylet_scenario::{FieldError, InputError, parse, read_text};
 use stylet_tissue::Tissue;
@@ -226,7 +226,7 @@ impl Dataset {
         let name =
             file.file_name().map_or_else(|| file.display().to_string(), |n| n.to_string_lossy().into_owned());
         if self.split_by.is_empty() {
-            let (recording, notes) = read_csv_skip_nonfinite(file, &self.options())?;
+            let (recording, notes) = read_csv(file, &self.options())?;
             return Ok(vec![(name, recording, notes)]);
         }
         let text = read_text_of(file)?;

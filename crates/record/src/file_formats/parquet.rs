@@ -1,10 +1,13 @@
 //! Parquet files.
 
-use super::columns_to_csv::NumericColumns;
+use super::numeric_columns::{NamedColumn, NumericColumns};
+use crate::units::{Unit, parse_unit};
 use bytes::Bytes;
+use parquet::basic::{ConvertedType, LogicalType, TimeUnit};
 use parquet::column::reader::ColumnReader;
 use parquet::data_type::DataType;
 use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::schema::types::ColumnDescriptor;
 
 /// An open file.
 pub(super) struct File {
@@ -54,21 +57,66 @@ fn read<T: DataType>(
     }
 }
 
+/// What the stored integers of a column count: parts of a second, or powers of ten.
+struct StoredAs {
+    /// Values per unit.
+    divisor: f64,
+    unit: Option<Unit>,
+}
+
+impl StoredAs {
+    fn of(column: &ColumnDescriptor) -> Self {
+        let ticks = match (column.logical_type_ref(), column.converted_type()) {
+            (Some(LogicalType::Timestamp(kind) | LogicalType::Time(kind)), _) => Some(match kind.unit {
+                TimeUnit::MILLIS => 1e3,
+                TimeUnit::MICROS => 1e6,
+                TimeUnit::NANOS => 1e9,
+            }),
+            (_, ConvertedType::TIMESTAMP_MILLIS | ConvertedType::TIME_MILLIS) => Some(1e3),
+            (_, ConvertedType::TIMESTAMP_MICROS | ConvertedType::TIME_MICROS) => Some(1e6),
+            _ => None,
+        };
+        match (ticks, column.converted_type()) {
+            (Some(divisor), _) => Self { divisor, unit: parse_unit("s") },
+            (None, ConvertedType::DECIMAL) => {
+                Self { divisor: 10_f64.powi(column.type_scale().clamp(0, 300)), unit: None }
+            }
+            _ => Self { divisor: 1.0, unit: None },
+        }
+    }
+}
+
+/// Days from the first of the Julian calendar to 1970.
+const JULIAN_DAY_OF_1970: f64 = 2_440_588.0;
+
 impl NumericColumns for File {
-    fn column_names(&self) -> Vec<String> {
+    fn columns(&self) -> Vec<NamedColumn> {
+        use parquet::basic::Type as Physical;
         let schema = self.reader.metadata().file_metadata().schema_descr();
-        schema.columns().iter().map(|c| c.path().string()).collect()
+        let numbers = schema.columns().iter().filter(|c| {
+            !matches!(c.physical_type(), Physical::BYTE_ARRAY | Physical::FIXED_LEN_BYTE_ARRAY)
+                && c.max_rep_level() == 0
+        });
+        let column = |c: &std::sync::Arc<ColumnDescriptor>| NamedColumn {
+            name: c.path().string(),
+            unit: if c.physical_type() == Physical::INT96 { parse_unit("s") } else { StoredAs::of(c).unit },
+        };
+        numbers.map(column).collect()
     }
 
     fn read_columns(&self, wanted: &[&str], _main: &str) -> Result<Vec<Vec<f64>>, String> {
-        let names = self.column_names();
         let schema = self.reader.metadata().file_metadata().schema_descr_ptr();
         let one = |name: &&str| {
-            let index = names.iter().position(|n| n == name).ok_or_else(|| format!("no \"{name}\""))?;
+            let index = schema
+                .columns()
+                .iter()
+                .position(|c| c.path().string() == *name)
+                .ok_or_else(|| format!("no \"{name}\""))?;
             let optional = schema.column(index).max_def_level() > 0;
             if schema.column(index).max_rep_level() > 0 {
                 return Err(format!("\"{name}\" has lists; a column of a recording has one number per row"));
             }
+            let divisor = StoredAs::of(&schema.column(index)).divisor;
             let mut out = Vec::new();
             for group in 0..self.reader.num_row_groups() {
                 let group = self.reader.get_row_group(group).map_err(damaged)?;
@@ -78,14 +126,20 @@ impl NumericColumns for File {
                         read(&mut r, optional, &mut out, |x| f64::from(*x))?
                     }
                     ColumnReader::Int32ColumnReader(mut r) => {
-                        read(&mut r, optional, &mut out, |x| f64::from(*x))?
+                        read(&mut r, optional, &mut out, |x| f64::from(*x) / divisor)?
                     }
                     ColumnReader::Int64ColumnReader(mut r) => {
-                        read(&mut r, optional, &mut out, |x| *x as f64)?
+                        read(&mut r, optional, &mut out, |x| *x as f64 / divisor)?
                     }
                     ColumnReader::BoolColumnReader(mut r) => {
                         read(&mut r, optional, &mut out, |x| f64::from(u8::from(*x)))?;
                     }
+                    // Nanoseconds of the day and the Julian day, as older pandas and Spark write.
+                    ColumnReader::Int96ColumnReader(mut r) => read(&mut r, optional, &mut out, |x| {
+                        let [low, high, day] = *x.data() else { return f64::NAN };
+                        let of_day = f64::from(low) + f64::from(high) * 4_294_967_296.0;
+                        (f64::from(day) - JULIAN_DAY_OF_1970) * 86_400.0 + of_day / 1e9
+                    })?,
                     _ => return Err(format!("\"{name}\" is not a column of numbers")),
                 }
             }

@@ -25,10 +25,17 @@ pub enum QualityKind {
     /// Among repeats: force over depth more than 5 robust standard deviations (RMS over 24 depths) from the others.
     /// Numbers: `distance`, `typical_n`, `others_n`.
     OutlierRecording,
-    /// Rows were dropped because their time stamps ran backward or repeated. Numbers: `dropped`, `kept`; `lines`.
+    /// Rows were dropped because their time stamps ran backward or repeated, or because the last one is cut short. Numbers:
+    /// `dropped`, `kept`; `lines`.
     RepairedRows,
+    /// Equal time stamps were spread evenly. Numbers: `samples`, `bursts`.
+    Retimed,
+    /// Columns of other topics, rows or files were interpolated on the time stamps of the force. Numbers: `samples`.
+    Interpolated,
+    /// Units that names, a row of units or types gave were applied, or components projected on an axis.
+    Converted,
     /// A quantity looks as if it had another unit: position range above 2 m, speed above 1 m/s (99th percentile), force above
-    /// 500 N, median interval above 1 s, or a measured velocity that is not the slope of the position. Blocking, except for
+    /// 500 N (not blocking), median interval above 1 s, or a measured velocity that is not the slope of the position. Blocking, except for
     /// the interval and for a velocity within 20 times the slope. Numbers: `value`, `limit`.
     UnitMixUp,
     /// Intervals above five median intervals. Numbers: `count`, `largest_s`, `at_s` (start of the largest),

@@ -10,6 +10,7 @@ pub mod experiment_plan;
 pub mod formatting;
 pub mod identifiability;
 pub mod indented_specimens;
+pub mod inspection;
 pub mod prediction;
 pub mod repeated_insertions;
 pub mod sweep;

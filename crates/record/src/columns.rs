@@ -1,0 +1,510 @@
+//! Which column holds which quantity: by a column map, by Stylet's names, or by names and units that are unmistakable.
+
+use std::path::Path;
+
+use crate::column_map::{Column, ColumnMap};
+use crate::error::RecordError;
+use crate::recording::JOINTS;
+use crate::text::layout::ColumnKind;
+use crate::units::{Dimension, Unit, quantity_of, split_name};
+
+/// Quantity of a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ColumnRole {
+    Time,
+    Position,
+    Force,
+    Velocity,
+    ForceVirtual,
+    JointTorque(usize),
+}
+
+impl ColumnRole {
+    /// Dimension of the quantity.
+    pub(crate) fn dimension(self) -> Dimension {
+        match self {
+            Self::Time => Dimension::Time,
+            Self::Position => Dimension::Length,
+            Self::Force | Self::ForceVirtual => Dimension::Force,
+            Self::Velocity => Dimension::Velocity,
+            Self::JointTorque(_) => Dimension::Other,
+        }
+    }
+
+    /// Name for messages, with the field of the map.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Time => "time",
+            Self::Position => "position",
+            Self::Force => "force",
+            Self::Velocity => "velocity",
+            Self::ForceVirtual => "force_virtual",
+            Self::JointTorque(_) => "joint torque",
+        }
+    }
+
+    /// Stylet's name and what it holds.
+    fn own(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Time => ("time_s", "time in seconds"),
+            Self::Position => ("position_m", "tip position in metres"),
+            Self::Force => ("force_n", "axial force in newtons"),
+            Self::Velocity => ("velocity_mps", "tip velocity in m/s"),
+            Self::ForceVirtual => ("force_virtual_n", "virtual force in newtons"),
+            Self::JointTorque(_) => ("joint_torque_1_nm", "joint torque in N m"),
+        }
+    }
+}
+
+/// Columns of a file, before they are read.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TableHead<'a> {
+    pub path: &'a Path,
+    /// Line of the names, or of the first row without names.
+    pub line: u64,
+    pub names: &'a [String],
+    /// Whether the file has names.
+    pub named: bool,
+    /// Units from a row of units or from typed columns.
+    pub units: &'a [Option<Unit>],
+    pub kinds: &'a [ColumnKind],
+}
+
+/// How the parts of a column make one value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Parts {
+    /// One column.
+    Single,
+    /// Seconds and nanoseconds.
+    SecondsNanoseconds,
+    /// Three components along an axis.
+    Components,
+}
+
+/// A column to be read: its role, its places in a row, its name and unit.
+#[derive(Debug, Clone)]
+pub(crate) struct MappedColumn {
+    pub role: ColumnRole,
+    pub indices: Vec<usize>,
+    pub parts: Parts,
+    pub name: String,
+    pub scale: f64,
+    pub offset: f64,
+    pub kind: ColumnKind,
+    /// Whether the user's map gives the scale.
+    pub scale_is_given: bool,
+}
+
+impl MappedColumn {
+    /// `scale * raw + offset`. A scale of 1 and an offset of 0 keep every bit, including the sign of zero.
+    #[inline]
+    pub(crate) fn apply(&self, raw: f64) -> f64 {
+        let scaled = if self.scale == 1.0 { raw } else { self.scale * raw };
+        if self.offset == 0.0 { scaled } else { scaled + self.offset }
+    }
+}
+
+/// The columns of a recording, and what was taken from names and units.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct MappedColumns {
+    /// Time first where there is one; each role at most once.
+    pub columns: Vec<MappedColumn>,
+    /// Units that were applied, as sentences.
+    pub remarks: Vec<String>,
+}
+
+const REQUIRED: [ColumnRole; 3] = [ColumnRole::Time, ColumnRole::Position, ColumnRole::Force];
+
+/// Finds the columns of a recording.
+///
+/// # Errors
+/// [`RecordError::MissingColumn`], [`RecordError::AmbiguousColumn`], [`RecordError::NoHeader`], [`RecordError::NoSuchColumn`].
+pub(crate) fn map_columns(
+    head: TableHead<'_>,
+    map: Option<&ColumnMap>,
+) -> Result<MappedColumns, RecordError> {
+    match map {
+        None => without_map(head),
+        Some(map) => {
+            let mut wanted = vec![
+                (ColumnRole::Time, &map.time),
+                (ColumnRole::Position, &map.position),
+                (ColumnRole::Force, &map.force),
+            ];
+            wanted.extend(map.velocity.iter().map(|column| (ColumnRole::Velocity, column)));
+            wanted.extend(map.force_virtual.iter().map(|column| (ColumnRole::ForceVirtual, column)));
+            let mut found = MappedColumns::default();
+            let taken: Vec<usize> = wanted
+                .iter()
+                .filter_map(|(role, column)| given(head, *role, column).ok()?)
+                .flat_map(|c| c.indices)
+                .collect();
+            for (role, column) in wanted {
+                if column.file.is_some()
+                    || (role == ColumnRole::Time && column.is_open() && map.rate_hz.is_some())
+                {
+                    continue;
+                }
+                let mapped = match given(head, role, column)? {
+                    Some(mapped) => mapped,
+                    None => {
+                        let mut mapped = open(head, role, &taken)?;
+                        mapped.scale = column.scale.unwrap_or(mapped.scale);
+                        mapped.scale_is_given = column.scale.is_some();
+                        mapped.offset = column.offset;
+                        mapped
+                    }
+                };
+                found.add(head, mapped);
+            }
+            Ok(found)
+        }
+    }
+}
+
+/// The columns for one role alone and the time, as another file holds them.
+pub(crate) fn map_series(
+    head: TableHead<'_>,
+    map: &ColumnMap,
+    role: ColumnRole,
+    column: &Column,
+) -> Result<MappedColumns, RecordError> {
+    let mut found = MappedColumns::default();
+    if map.rate_hz.is_none() || !map.time.is_open() {
+        // The other file may name its time otherwise.
+        let time = match given(head, ColumnRole::Time, &map.time) {
+            Ok(Some(time)) => time,
+            _ => open(head, ColumnRole::Time, &[])?,
+        };
+        found.add(head, time);
+    }
+    let column = match given(head, role, column)? {
+        Some(mapped) => mapped,
+        None => {
+            let mapped = open(head, role, &[])?;
+            MappedColumn { scale: column.scale.unwrap_or(mapped.scale), offset: column.offset, ..mapped }
+        }
+    };
+    found.add(head, column);
+    Ok(found)
+}
+
+/// The column of one role, as [`map_columns`] would choose it.
+///
+/// # Errors
+/// As [`map_columns`].
+pub(crate) fn find_role(
+    head: TableHead<'_>,
+    role: ColumnRole,
+    column: &Column,
+) -> Result<MappedColumn, RecordError> {
+    match given(head, role, column)? {
+        Some(mapped) => Ok(mapped),
+        None => {
+            let mapped = open(head, role, &[])?;
+            Ok(MappedColumn {
+                scale: column.scale.unwrap_or(mapped.scale),
+                scale_is_given: column.scale.is_some(),
+                offset: column.offset,
+                ..mapped
+            })
+        }
+    }
+}
+
+impl MappedColumns {
+    fn add(&mut self, head: TableHead<'_>, column: MappedColumn) {
+        if column.scale != 1.0 && !column.scale_is_given && column.kind != ColumnKind::Date {
+            let index = column.indices.first().copied().unwrap_or(0);
+            if let Some(unit) = unit_of(head, index) {
+                self.remarks.push(format!(
+                    "{} \"{}\" is in {}: multiplied by {}",
+                    column.role.name(),
+                    column.name,
+                    unit.symbol,
+                    unit.to_si
+                ));
+            }
+        }
+        self.columns.push(column);
+    }
+
+    /// Places of all parts, in the order of the columns.
+    pub(crate) fn indices(&self) -> Vec<usize> {
+        self.columns.iter().flat_map(|column| column.indices.iter().copied()).collect()
+    }
+
+    /// The column of a role.
+    pub(crate) fn of(&self, role: ColumnRole) -> Option<&MappedColumn> {
+        self.columns.iter().find(|column| column.role == role)
+    }
+}
+
+/// The unit of a column: from the row of units or its type, or from its name.
+pub(crate) fn unit_of(head: TableHead<'_>, index: usize) -> Option<Unit> {
+    head.units.get(index).copied().flatten().or_else(|| split_name(head.names.get(index)?).unit)
+}
+
+/// A column with the unit that the file says, where it is one of the quantity.
+fn mapped(head: TableHead<'_>, role: ColumnRole, indices: Vec<usize>, column: &Column) -> MappedColumn {
+    let first = indices.first().copied().unwrap_or(0);
+    let kind = head.kinds.get(first).copied().unwrap_or(ColumnKind::Number);
+    let unit = unit_of(head, first).filter(|unit| unit.dimension == role.dimension());
+    let parts = match indices.len() {
+        2 => Parts::SecondsNanoseconds,
+        3 => Parts::Components,
+        _ => Parts::Single,
+    };
+    let name =
+        if column.is_open() { head.names.get(first).cloned().unwrap_or_default() } else { column.label() };
+    let of_file = match (kind, parts) {
+        (ColumnKind::Date, _) | (_, Parts::SecondsNanoseconds) => 1.0,
+        _ => unit.map_or(1.0, |unit| unit.to_si),
+    };
+    MappedColumn {
+        role,
+        indices,
+        parts,
+        name,
+        scale: column.scale.unwrap_or(of_file),
+        offset: column.offset,
+        kind,
+        scale_is_given: column.scale.is_some(),
+    }
+}
+
+/// The column that a map names; `None` when the map leaves it open.
+fn given(
+    head: TableHead<'_>,
+    role: ColumnRole,
+    column: &Column,
+) -> Result<Option<MappedColumn>, RecordError> {
+    let numbers: Vec<usize> = column.column.into_iter().chain(column.columns.iter().copied()).collect();
+    let names: Vec<&String> =
+        if column.name.is_empty() { column.names.iter().collect() } else { vec![&column.name] };
+    let mut indices = Vec::new();
+    for number in numbers {
+        if number == 0 || number > head.names.len() {
+            return Err(RecordError::NoSuchColumn {
+                path: head.path.to_owned(),
+                line: head.line,
+                number,
+                columns: head.names.len(),
+            });
+        }
+        indices.push(number - 1);
+    }
+    for name in names {
+        match place(head, name.trim())? {
+            Some(index) => indices.push(index),
+            None => {
+                // `wrench` stands for `wrench.1`, `wrench.2`, `wrench.3`.
+                let parts: Vec<usize> = (1..=4)
+                    .filter_map(|k| head.names.iter().position(|n| *n == format!("{}.{k}", name.trim())))
+                    .collect();
+                if parts.len() != 3 {
+                    return Err(missing(head, name, map_words(role)));
+                }
+                indices.extend(parts);
+            }
+        }
+    }
+    Ok((!indices.is_empty()).then(|| mapped(head, role, indices, column)))
+}
+
+fn map_words(role: ColumnRole) -> &'static str {
+    match role {
+        ColumnRole::Time => "the column map's time",
+        ColumnRole::Position => "the column map's position",
+        ColumnRole::Force => "the column map's force",
+        ColumnRole::Velocity => "the column map's velocity",
+        _ => "the column map's virtual force",
+    }
+}
+
+/// The place of a name; an error when it occurs twice.
+fn place(head: TableHead<'_>, name: &str) -> Result<Option<usize>, RecordError> {
+    let mut places = head.names.iter().enumerate().filter(|(_, existing)| existing.trim() == name);
+    let found = places.next().map(|(index, _)| index);
+    match places.next() {
+        Some(_) => Err(RecordError::AmbiguousColumn {
+            path: head.path.to_owned(),
+            line: head.line,
+            column: name.to_owned(),
+        }),
+        None => Ok(found),
+    }
+}
+
+fn missing(head: TableHead<'_>, column: &str, what: &'static str) -> RecordError {
+    if !head.named {
+        return RecordError::NoHeader {
+            path: head.path.to_owned(),
+            line: head.line,
+            columns: head.names.len(),
+        };
+    }
+    RecordError::MissingColumn {
+        path: head.path.to_owned(),
+        line: head.line,
+        suggestion: closest(column, head.names),
+        column: column.to_owned(),
+        what,
+        available: head.names.to_vec(),
+    }
+}
+
+/// The columns of a file without a map.
+fn without_map(head: TableHead<'_>) -> Result<MappedColumns, RecordError> {
+    let mut found = MappedColumns::default();
+    for role in REQUIRED {
+        found.add(head, open(head, role, &[])?);
+    }
+    let mut own = |role, name: &str| -> Result<bool, RecordError> {
+        let index = place(head, name)?;
+        if let Some(index) = index {
+            found.add(head, mapped(head, role, vec![index], &Column::si(name)));
+        }
+        Ok(index.is_some())
+    };
+    own(ColumnRole::Velocity, "velocity_mps")?;
+    own(ColumnRole::ForceVirtual, "force_virtual_n")?;
+    let torques = (0..JOINTS).filter(|joint| head.names.contains(&joint_torque_name(*joint))).count();
+    if torques > 0 {
+        for joint in 0..JOINTS {
+            let name = joint_torque_name(joint);
+            if !own(ColumnRole::JointTorque(joint), &name)? {
+                return Err(missing(head, &name, "joint torque in N m: all seven joints or none"));
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// A column that is found by its name and unit. Columns in `taken` are other quantities.
+fn open(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Result<MappedColumn, RecordError> {
+    let (own, what) = role.own();
+    let column = Column::default();
+    if let Some(index) = place(head, own)? {
+        return Ok(mapped(head, role, vec![index], &Column { scale: Some(1.0), ..column }).named_only());
+    }
+    let found = unmistakable(head, role, taken);
+    match found.as_slice() {
+        [index] => Ok(mapped(head, role, vec![*index], &column)),
+        [] => Err(missing(head, own, what)),
+        [first, ..] if role == ColumnRole::Time => Ok(mapped(head, role, vec![*first], &column)),
+        several => Err(RecordError::SeveralColumns {
+            path: head.path.to_owned(),
+            line: head.line,
+            what,
+            field: role.name(),
+            columns: several.iter().filter_map(|index| head.names.get(*index).cloned()).collect(),
+        }),
+    }
+}
+
+impl MappedColumn {
+    /// A scale that follows from the name, not from a map.
+    fn named_only(self) -> Self {
+        let scale_is_given = self.kind == ColumnKind::Date;
+        Self { scale_is_given, ..self }
+    }
+}
+
+/// Columns whose name and unit say that they hold the quantity.
+fn unmistakable(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Vec<usize> {
+    let (own, _) = role.own();
+    let free = || (0..head.names.len()).filter(|index| !taken.contains(index));
+    // `/insertion.time_s`, as `stylet convert` writes MCAP.
+    let suffix = format!(".{own}");
+    let ends: Vec<usize> = free().filter(|index| head.names[*index].ends_with(&suffix)).collect();
+    if !ends.is_empty() {
+        return ends;
+    }
+    let kind = |index: usize| head.kinds.get(index).copied().unwrap_or(ColumnKind::Number);
+    let with_unit: Vec<usize> = free()
+        .filter(|index| match kind(*index) {
+            ColumnKind::Date => role == ColumnRole::Time,
+            ColumnKind::Number | ColumnKind::Empty => {
+                unit_of(head, *index).is_some_and(|unit| unit.dimension == role.dimension())
+            }
+            ColumnKind::Text => false,
+        })
+        .collect();
+    let by_name: Vec<usize> = with_unit
+        .iter()
+        .copied()
+        .filter(|index| quantity_of(&split_name(&head.names[*index]).base) == Some(role.dimension()))
+        .collect();
+    let found = if by_name.is_empty() { with_unit } else { by_name };
+    // Columns that never hold a value are no candidates where others do.
+    let filled: Vec<usize> =
+        found.iter().copied().filter(|index| kind(*index) != ColumnKind::Empty).collect();
+    if filled.is_empty() { found } else { filled }
+}
+
+/// Header name of the torque of a joint (0-based); names count from one.
+pub(crate) fn joint_torque_name(joint: usize) -> String {
+    format!("joint_torque_{}_nm", joint + 1)
+}
+
+/// The most similar existing name, if any is close.
+fn closest(wanted: &str, names: &[String]) -> Option<String> {
+    let target = wanted.to_lowercase();
+    let stem = target.rsplit_once('_').map_or(target.as_str(), |(stem, _unit)| stem);
+    let max_distance = (target.chars().count() / 3).max(2);
+    names
+        .iter()
+        .filter(|name| !name.is_empty())
+        .map(|name| {
+            let candidate = name.to_lowercase();
+            let same_quantity =
+                candidate.starts_with(stem) || (candidate.len() >= 3 && stem.starts_with(&candidate));
+            let distance = edit_distance(&target, &candidate).min(1 + edit_distance(stem, &candidate));
+            (if same_quantity { distance.min(max_distance) } else { distance }, name)
+        })
+        .filter(|(distance, _)| *distance <= max_distance)
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, name)| name.clone())
+}
+
+/// Levenshtein distance in characters.
+fn edit_distance(a: &str, b: &str) -> usize {
+    let b: Vec<char> = b.chars().collect();
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, from) in a.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, to) in b.iter().enumerate() {
+            let substituted = diagonal + usize::from(from != *to);
+            diagonal = row[j + 1];
+            row[j + 1] = substituted.min(diagonal + 1).min(row[j] + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(line: &str) -> Vec<String> {
+        line.split(',').map(str::to_owned).collect()
+    }
+
+    #[test]
+    fn a_similar_name_is_suggested_and_a_different_one_is_not() {
+        assert_eq!(closest("time_s", &names("Time_s,fz")), Some("Time_s".to_owned()));
+        assert_eq!(closest("time_s", &names("timestamp_ns,fz")), Some("timestamp_ns".to_owned()));
+        assert_eq!(closest("position_m", &names("t,pos,fz")), Some("pos".to_owned()));
+        assert_eq!(closest("force_n", &names("fz,px,forse_n")), Some("forse_n".to_owned()));
+        assert_eq!(closest("force_n", &names("fz,px,py")), None);
+    }
+
+    #[test]
+    fn edit_distance_counts_insertions_deletions_and_substitutions() {
+        assert_eq!(edit_distance("force", "forse"), 1);
+        assert_eq!(edit_distance("time", ""), 4);
+        assert_eq!(edit_distance("kitten", "sitting"), 3);
+    }
+}

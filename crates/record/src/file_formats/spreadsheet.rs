@@ -1,0 +1,89 @@
+//! Spreadsheets: xlsx, xls, ods, as the text table that their program would export.
+
+use calamine::{Data, Range, Reader, open_workbook_auto_from_rs};
+use std::fmt::Write as _;
+use std::io::Cursor;
+
+/// Most cells of a sheet; a damaged file may announce any number.
+const MAX_CELLS: usize = 200_000_000;
+
+/// A sheet as text, one line per row, columns separated by tabs. Without a name the sheet with most numbers is taken.
+pub(super) fn to_text(bytes: &[u8], sheet: Option<&str>) -> Result<Vec<u8>, String> {
+    let mut book = open_workbook_auto_from_rs(Cursor::new(bytes))
+        .map_err(|e| format!("it cannot be read ({e}); save it as xlsx, ods or CSV"))?;
+    let names = book.sheet_names();
+    let list = || names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
+    let range = match sheet {
+        Some(name) if !names.iter().any(|existing| existing == name) => {
+            return Err(format!("it has no sheet \"{name}\"; it has {}", list()));
+        }
+        Some(name) => {
+            book.worksheet_range(name).map_err(|e| format!("the sheet \"{name}\" cannot be read ({e})"))?
+        }
+        None => {
+            let mut best: Option<(usize, Range<Data>)> = None;
+            for name in &names {
+                let Ok(range) = book.worksheet_range(name) else { continue };
+                let count = range
+                    .used_cells()
+                    .filter(|(_, _, cell)| matches!(cell, Data::Float(_) | Data::Int(_)))
+                    .count();
+                if best.as_ref().is_none_or(|(most, _)| count > *most) {
+                    best = Some((count, range));
+                }
+            }
+            best.map(|(_, range)| range).ok_or_else(|| "it has no sheet that can be read".to_owned())?
+        }
+    };
+    let Some((first_row, _)) = range.start() else { return Ok(Vec::new()) };
+    let (height, width) = range.get_size();
+    if height.saturating_mul(width) > MAX_CELLS {
+        return Err(format!(
+            "the sheet has {height} rows of {width} cells; at most {MAX_CELLS} cells are read"
+        ));
+    }
+    // Lines have the numbers of the rows.
+    let mut text = "\n".repeat(first_row as usize);
+    for row in range.rows() {
+        for (at, cell) in row.iter().enumerate() {
+            if at > 0 {
+                text.push('\t');
+            }
+            write_cell(&mut text, cell);
+        }
+        // Trailing empty cells differ from row to row only by formatting.
+        while text.ends_with('\t') && row.iter().all(|cell| matches!(cell, Data::Empty)) {
+            text.pop();
+        }
+        text.push('\n');
+    }
+    Ok(text.into_bytes())
+}
+
+fn write_cell(text: &mut String, cell: &Data) {
+    match cell {
+        Data::Float(x) => {
+            let _ = write!(text, "{x}");
+        }
+        Data::Int(x) => {
+            let _ = write!(text, "{x}");
+        }
+        Data::Bool(x) => text.push(if *x { '1' } else { '0' }),
+        // Days since 1899-12-30, as seconds; differences are what counts.
+        Data::DateTime(x) => {
+            let _ = write!(text, "{}", x.as_f64() * 86_400.0);
+        }
+        Data::String(s) | Data::DateTimeIso(s) | Data::DurationIso(s) => {
+            let clean: String =
+                s.chars().map(|c| if matches!(c, '\t' | '\n' | '\r') { ' ' } else { c }).collect();
+            if clean.contains('"') {
+                let _ = write!(text, "\"{}\"", clean.replace('"', "\"\""));
+            } else {
+                text.push_str(&clean);
+            }
+        }
+        Data::Error(_) | Data::Empty => {}
+        #[allow(unreachable_patterns)] // calamine may add kinds
+        _ => {}
+    }
+}

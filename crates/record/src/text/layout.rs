@@ -1,0 +1,453 @@
+//! Layout of a text table: preamble, line of names, row of units, delimiter, decimal sign, first row of numbers.
+
+use super::number::{FieldKind, Separators, classify};
+use super::ros;
+use crate::units::{Dimension, Unit, parse_unit, quantity_of};
+
+/// Separator of the columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Delimiter {
+    /// A character.
+    Byte(u8),
+    /// One or more blanks or tabs.
+    Blanks,
+}
+
+impl Delimiter {
+    /// Name for people.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Byte(b',') => "comma",
+            Self::Byte(b';') => "semicolon",
+            Self::Byte(b'\t') => "tab",
+            Self::Byte(b'|') => "|",
+            Self::Byte(_) => "character",
+            Self::Blanks => "blanks",
+        }
+    }
+}
+
+/// Delimiters in the order of preference: a comma may be a decimal sign, and blanks occur inside fields.
+pub(crate) const DELIMITERS: [Delimiter; 5] = [
+    Delimiter::Byte(b';'),
+    Delimiter::Byte(b'\t'),
+    Delimiter::Byte(b'|'),
+    Delimiter::Byte(b','),
+    Delimiter::Blanks,
+];
+
+/// Contents of a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ColumnKind {
+    /// Numbers.
+    Number,
+    /// Dates or times of day.
+    Date,
+    /// Text.
+    Text,
+    /// No values.
+    Empty,
+}
+
+/// Layout of a text table.
+#[derive(Debug, Clone)]
+pub(crate) struct TextLayout {
+    pub delimiter: Delimiter,
+    pub decimal_comma: bool,
+    /// A number such as `1,234` when nothing decides between decimal comma and thousands.
+    pub open_decimal: Option<String>,
+    /// First byte of comment lines.
+    pub comment: Option<u8>,
+    /// One name per column; `column 1` ... without names.
+    pub names: Vec<String>,
+    pub names_line: Option<u64>,
+    pub units: Vec<Option<Unit>>,
+    pub units_line: Option<u64>,
+    pub kinds: Vec<ColumnKind>,
+    /// Offset and line of the first row.
+    pub data_start: usize,
+    pub data_line: u64,
+    /// Lines before the names that are not blank.
+    pub preamble: Vec<String>,
+}
+
+impl TextLayout {
+    /// Columns of a row.
+    pub(crate) fn width(&self) -> usize {
+        self.names.len()
+    }
+}
+
+/// What a column map fixes of the layout.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct LayoutHints {
+    pub header_line: Option<u64>,
+    pub decimal_comma: Option<bool>,
+}
+
+/// Most lines that decide.
+const MAX_LINES: usize = 3000;
+/// Rows that decide kinds of columns and the decimal sign.
+const SAMPLE_ROWS: usize = 400;
+/// Most lines between names and numbers.
+const MAX_HEADER_LINES: usize = 4;
+
+/// A line of the head of a file.
+#[derive(Debug, Clone, Copy)]
+struct Line<'a> {
+    text: &'a str,
+    offset: usize,
+    number: u64,
+}
+
+fn lines(text: &str, from: usize, first_number: u64) -> Vec<Line<'_>> {
+    let (mut out, mut offset, mut number) = (Vec::new(), from, first_number);
+    while offset < text.len() && out.len() < MAX_LINES {
+        let rest = &text[offset..];
+        let end = rest.find(['\n', '\r']).unwrap_or(rest.len());
+        out.push(Line { text: &rest[..end], offset, number });
+        let ends = if rest[end..].starts_with("\r\n") { 2 } else { usize::from(end < rest.len()) };
+        offset += end + ends;
+        number += 1;
+    }
+    out
+}
+
+/// The fields of a line without surrounding blanks and quotation marks.
+pub(crate) fn split(line: &str, delimiter: Delimiter) -> Vec<String> {
+    let (mut out, mut field, mut quoted, mut any) = (Vec::new(), String::new(), false, false);
+    let mut chars = line.chars().peekable();
+    while let Some(c) = chars.next() {
+        let separates = !quoted
+            && match delimiter {
+                Delimiter::Byte(byte) => c == char::from(byte),
+                Delimiter::Blanks => c == ' ' || c == '\t',
+            };
+        if separates {
+            if delimiter != Delimiter::Blanks || any {
+                out.push(field.trim().to_owned());
+            }
+            field.clear();
+            any = false;
+        } else if c == '"' && (quoted || field.trim().is_empty()) {
+            if quoted && chars.peek() == Some(&'"') {
+                field.push('"');
+                chars.next();
+            } else {
+                quoted = !quoted;
+            }
+            any = true;
+        } else {
+            field.push(c);
+            any = true;
+        }
+    }
+    if delimiter != Delimiter::Blanks || any {
+        out.push(field.trim().to_owned());
+    }
+    out
+}
+
+/// The rows that look like numbers, with one delimiter.
+struct Block {
+    delimiter: Delimiter,
+    /// Fields per row, without an empty last one.
+    width: usize,
+    /// Index of the first line.
+    first: usize,
+    score: f64,
+}
+
+/// Width of a row without an empty last field.
+fn data_width(fields: &[String]) -> usize {
+    fields.len() - usize::from(fields.len() > 1 && fields.last().is_some_and(String::is_empty))
+}
+
+/// Share of the fields of a row that are numbers, dates or missing; `None` when it is no row of data.
+fn purity(fields: &[String]) -> Option<f64> {
+    let (mut numbers, mut others) = (0, 0);
+    for field in fields {
+        match classify(field) {
+            FieldKind::Number(_) | FieldKind::Date => numbers += 1,
+            FieldKind::Missing => {}
+            FieldKind::Text => others += 1,
+        }
+    }
+    (numbers > 0 && numbers >= others).then(|| 1.0 - f64::from(others) / fields.len().max(1) as f64)
+}
+
+fn block(lines: &[Line<'_>], delimiter: Delimiter) -> Option<Block> {
+    // Rows by width: how many, and their purity.
+    let mut widths: std::collections::BTreeMap<usize, (f64, f64)> = std::collections::BTreeMap::new();
+    let mut rows: Vec<Option<usize>> = Vec::with_capacity(lines.len());
+    for line in lines {
+        let fields = split(line.text, delimiter);
+        let width = data_width(&fields);
+        let pure = (!is_comment(line.text)).then(|| purity(&fields[..width])).flatten();
+        if let Some(pure) = pure {
+            let entry = widths.entry(width).or_default();
+            entry.0 += 1.0;
+            entry.1 += pure;
+        }
+        rows.push(pure.map(|_| width));
+    }
+    let (width, (count, pure)) = widths
+        .into_iter()
+        .filter(|(width, _)| *width > 1 || delimiter == Delimiter::Blanks)
+        .max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    let first = rows.iter().position(|row| *row == Some(width))?;
+    let mean = pure / count;
+    // One column alone is the last resort.
+    let score = count * mean * mean * if width > 1 { 1.0 } else { 0.1 };
+    Some(Block { delimiter, width, first, score })
+}
+
+/// Whether a line is a comment.
+fn is_comment(line: &str) -> bool {
+    line.trim_start().starts_with(['#', '%'])
+}
+
+fn without_comment_mark(line: &str) -> &str {
+    line.trim_start().trim_start_matches(['#', '%']).trim_start()
+}
+
+/// Finds the layout of the table in the head of a text; `None` without rows of numbers.
+pub(crate) fn find_layout(head: &str, from: usize, from_line: u64, hints: LayoutHints) -> Option<TextLayout> {
+    let all = lines(head, from, from_line);
+    let candidates = match hints.header_line {
+        // Rows before the given line are no data.
+        Some(names) => all.iter().filter(|line| line.number > names).copied().collect::<Vec<_>>(),
+        None => all.clone(),
+    };
+    let found = DELIMITERS
+        .iter()
+        .filter_map(|delimiter| block(&candidates, *delimiter))
+        .reduce(|best, next| if next.score > best.score { next } else { best })?;
+    let first_row = candidates.get(found.first)?;
+    let first = all.iter().position(|line| line.offset == first_row.offset)?;
+    let header = header(&all, first, &found, hints);
+    let width = header.names.as_ref().map_or(found.width, Vec::len);
+    let mut layout = TextLayout {
+        delimiter: found.delimiter,
+        decimal_comma: false,
+        open_decimal: None,
+        comment: Some(if all[first..].iter().take(SAMPLE_ROWS).any(|l| l.text.starts_with('%')) {
+            b'%'
+        } else {
+            b'#'
+        }),
+        names: header.names.unwrap_or_else(|| ros::echoed_names(first_row.text, found.delimiter, width)),
+        names_line: header.names_line,
+        units: header.units,
+        units_line: header.units_line,
+        kinds: Vec::new(),
+        data_start: first_row.offset,
+        data_line: first_row.number,
+        preamble: header.preamble,
+    };
+    layout.units.resize(width, None);
+    ros::add_units(&layout.names, &mut layout.units);
+    layout.look_at_rows(head, hints);
+    Some(layout)
+}
+
+impl TextLayout {
+    /// Kinds of the columns and the decimal sign, from the first rows.
+    pub(crate) fn look_at_rows(&mut self, head: &str, hints: LayoutHints) {
+        let rows = lines(head, self.data_start, self.data_line);
+        let complete = rows.len().saturating_sub(1).max(1);
+        let width = self.width();
+        let (mut numbers, mut dates, mut texts) =
+            (vec![0_u32; width], vec![0_u32; width], vec![0_u32; width]);
+        let (mut points, mut commas, mut open) = (0, 0, None);
+        for line in rows.iter().take(complete.min(SAMPLE_ROWS)) {
+            for (at, field) in split(line.text, self.delimiter).iter().take(width).enumerate() {
+                match classify(field) {
+                    FieldKind::Number(separators) => {
+                        numbers[at] += 1;
+                        match separators {
+                            Separators::Point => points += 1,
+                            Separators::Comma => commas += 1,
+                            Separators::PointOrComma => open = open.or_else(|| Some(field.clone())),
+                            Separators::None => {}
+                        }
+                    }
+                    FieldKind::Date => dates[at] += 1,
+                    FieldKind::Text => texts[at] += 1,
+                    FieldKind::Missing => {}
+                }
+            }
+        }
+        self.decimal_comma = hints.decimal_comma.unwrap_or(commas > 0 && commas > points);
+        self.open_decimal =
+            if points == 0 && commas == 0 && hints.decimal_comma.is_none() { open } else { None };
+        self.kinds = (0..width)
+            .map(|at| match (numbers[at], dates[at], texts[at]) {
+                (0, 0, 0) => ColumnKind::Empty,
+                (n, d, t) if d >= n && d >= t => ColumnKind::Date,
+                (n, _, t) if n >= t => ColumnKind::Number,
+                _ => ColumnKind::Text,
+            })
+            .collect();
+    }
+}
+
+#[derive(Default)]
+struct Header {
+    names: Option<Vec<String>>,
+    names_line: Option<u64>,
+    units: Vec<Option<Unit>>,
+    units_line: Option<u64>,
+    preamble: Vec<String>,
+}
+
+/// Names and units in the lines above the first row.
+fn header(all: &[Line<'_>], first: usize, block: &Block, hints: LayoutHints) -> Header {
+    let above: Vec<(usize, Vec<String>)> = all[..first]
+        .iter()
+        .enumerate()
+        .rev()
+        .filter(|(_, line)| !line.text.trim().is_empty())
+        .take(if hints.header_line.is_some() { usize::MAX } else { MAX_HEADER_LINES })
+        .map(|(at, line)| (at, header_fields(line.text, block)))
+        .collect();
+    let mut header = Header::default();
+    let fits = |fields: &[String]| {
+        let width = data_width(fields);
+        width == block.width || (fields.len() == block.width + 1 && width == block.width + 1)
+    };
+    let is_given = |at: usize| hints.header_line == Some(all[at].number);
+    let mut names_at = None;
+    for (at, fields) in &above {
+        if is_given(*at) {
+            let mut fields = fields.clone();
+            fields.truncate(data_width(&fields).max(block.width));
+            fields.resize(block.width.max(fields.len()), String::new());
+            header.names = Some(fields);
+            names_at = Some(*at);
+            break;
+        }
+        if !fits(fields) {
+            if hints.header_line.is_none() && header.names.is_some() {
+                break;
+            }
+            continue;
+        }
+        if is_row_of_units(fields) && header.units_line.is_none() {
+            header.units = fields.iter().map(|field| parse_unit(field)).collect();
+            header.units_line = Some(all[*at].number);
+        } else if hints.header_line.is_none() && fields.iter().any(|f| f.chars().any(char::is_alphabetic)) {
+            let mut fields = fields.clone();
+            fields.truncate(data_width(&fields));
+            header.names = Some(fields);
+            names_at = Some(*at);
+            break;
+        }
+    }
+    if header.names.is_none() {
+        // A row that reads like units is the names when nothing stands above it.
+        header.units.clear();
+        if let (Some(line), None) = (header.units_line.take(), hints.header_line)
+            && let Some((at, fields)) = above.iter().find(|(at, _)| all[*at].number == line)
+        {
+            header.names = Some(fields[..data_width(fields)].to_vec());
+            names_at = Some(*at);
+        }
+    }
+    header.names_line = names_at.map(|at| all[at].number);
+    let before = names_at.unwrap_or(first);
+    header.preamble = all[..before]
+        .iter()
+        .map(|line| line.text.trim().to_owned())
+        .filter(|t| !t.is_empty())
+        .take(40)
+        .collect();
+    header
+}
+
+/// Fields of a line above the rows; a blank inside brackets does not separate names.
+fn header_fields(line: &str, block: &Block) -> Vec<String> {
+    let fields = split(without_comment_mark(line), block.delimiter);
+    if block.delimiter != Delimiter::Blanks || fields.len() <= block.width {
+        return fields;
+    }
+    let mut merged: Vec<String> = Vec::new();
+    for field in fields {
+        match merged.last_mut() {
+            Some(last) if field.starts_with(['(', '[']) => {
+                last.push(' ');
+                last.push_str(&field);
+            }
+            _ => merged.push(field),
+        }
+    }
+    merged
+}
+
+/// Whether the fields of a line are units rather than names.
+pub(crate) fn is_row_of_units(fields: &[String]) -> bool {
+    let filled: Vec<&String> = fields.iter().filter(|field| !field.is_empty()).collect();
+    let units = filled.iter().filter_map(|field| parse_unit(field).map(|unit| (field, unit)));
+    let mut known = 0;
+    for (field, unit) in units {
+        // A column may be called `time`, but not `kN`.
+        if unit.dimension == Dimension::Other || quantity_of(field).is_none() || field.starts_with(['(', '['])
+        {
+            known += 1;
+        }
+    }
+    // Names such as `s, m, g` would be odd; two thirds decide.
+    !filled.is_empty() && known * 3 >= filled.len() * 2
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn layout(text: &str) -> TextLayout {
+        find_layout(text, 0, 1, LayoutHints::default()).expect("a table")
+    }
+
+    #[test]
+    fn a_preamble_a_row_of_units_and_decimal_commas_are_found() {
+        let text = "\"Test\";\"7\"\r\n\"Operator\";\"A. B.\"\r\n\r\n\"Zeit\";\"Weg\";\"Kraft\"\r\n\"(s)\";\"(mm)\";\"(N)\"\r\n\
+                    \"0,000\";\"-1,5\";\"0,01\"\r\n\"0,005\";\"-1,4\";\"0,02\"\r\n";
+        let found = layout(text);
+        assert_eq!(found.names, ["Zeit", "Weg", "Kraft"]);
+        assert_eq!((found.names_line, found.units_line, found.data_line), (Some(4), Some(5), 6));
+        assert_eq!(found.units[1].map(|u| u.symbol), Some("mm"));
+        assert!(found.decimal_comma);
+        assert_eq!(found.preamble.len(), 2);
+    }
+
+    #[test]
+    fn a_commented_header_and_blanks_are_found() {
+        let found =
+            layout("# time_s position_m force_n\n0.0 -0.01 0.1\n 0.005  -0.0099 0.2\n0.01 -0.0098 0.3\n");
+        assert_eq!(found.names, ["time_s", "position_m", "force_n"]);
+        assert_eq!(found.delimiter, Delimiter::Blanks);
+    }
+
+    #[test]
+    fn rows_without_names_and_with_a_comma_at_the_end_have_numbered_columns() {
+        let found = layout("0.0,-0.01,0.1,\n0.005,-0.0099,0.2,\n");
+        assert_eq!(found.names, ["column 1", "column 2", "column 3"]);
+        assert_eq!((found.names_line, found.data_line), (None, 1));
+    }
+
+    #[test]
+    fn thousands_in_quotation_marks_are_no_decimal_commas() {
+        let found = layout("t,x,f\n0.0,0.1,\"999.500\"\n0.005,0.2,\"1,000.250\"\n0.01,0.3,\"1,001.5\"\n");
+        assert!(!found.decimal_comma && found.delimiter == Delimiter::Byte(b','));
+        assert_eq!(found.kinds, [ColumnKind::Number; 3]);
+    }
+
+    #[test]
+    fn semicolons_with_decimal_commas_are_not_commas() {
+        let found = layout("t;note;f\n0,0;abc;1,2\n0,5;def;1,3\n");
+        assert_eq!(found.delimiter, Delimiter::Byte(b';'));
+        assert!(found.decimal_comma);
+        assert_eq!(found.kinds, [ColumnKind::Number, ColumnKind::Text, ColumnKind::Number]);
+    }
+}

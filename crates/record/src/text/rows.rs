@@ -1,0 +1,319 @@
+//! Rows of a text table as numbers.
+
+use std::io::{BufRead, BufReader, Read};
+
+use super::layout::{ColumnKind, Delimiter, TextLayout, split};
+use super::number::{is_missing, parse_date_ns, parse_number};
+use super::source::{CHUNK_BYTES, SourceFile};
+use crate::error::RecordError;
+
+/// A field of a row that is read.
+#[derive(Debug, Clone)]
+pub(crate) struct WantedField {
+    /// Place in a row.
+    pub index: usize,
+    /// Name for messages.
+    pub name: String,
+    pub kind: ColumnKind,
+    /// Whether large integers are counted from the first one, so that nanoseconds since 1970 keep their digits.
+    pub from_first: bool,
+}
+
+/// A field without a value.
+#[derive(Debug, Clone)]
+pub(crate) struct MissingValue {
+    pub offset: usize,
+    /// Which of the wanted fields.
+    pub field: usize,
+    pub text: String,
+}
+
+/// What was noticed while reading.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct RowsRead {
+    pub rows: usize,
+    pub first_missing: Option<MissingValue>,
+    /// Offset of a last row that is cut short.
+    pub cut_row: Option<usize>,
+    /// Fields that are no numbers, by column; only with [`Tolerance::Lenient`].
+    pub bad_values: Vec<BadValues>,
+    /// Rows with another number of fields: how many, the line and the error of the first; only with [`Tolerance::Lenient`].
+    pub ragged: Option<(usize, u64, std::sync::Arc<RecordError>)>,
+    /// First values, of dates (ns since 1970) and large integers, from which others are counted.
+    pub origins: Vec<Option<i64>>,
+}
+
+/// Fields of a column that are no numbers.
+#[derive(Debug, Clone)]
+pub(crate) struct BadValues {
+    /// Which of the wanted fields.
+    pub field: usize,
+    pub count: usize,
+    /// Line and error of the first.
+    pub line: u64,
+    pub first: std::sync::Arc<RecordError>,
+}
+
+/// What happens to rows that are wrong.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Tolerance {
+    /// They are errors.
+    Strict,
+    /// They are counted; a field that is no number is missing, a row with another number of fields is left out.
+    Lenient,
+}
+
+/// Digits from which on an integer loses some as a number.
+const LARGE_DIGITS: usize = 16;
+/// Least rows before a last row that is cut short and left out.
+const MIN_ROWS_BEFORE_CUT: usize = 3;
+
+impl RowsRead {
+    fn add_ragged(&mut self, error: RecordError) {
+        let line = match &error {
+            RecordError::RaggedRow { line, .. } => *line,
+            _ => 1,
+        };
+        self.ragged.get_or_insert_with(|| (0, line, error.into())).0 += 1;
+    }
+}
+
+/// Records with one delimiter.
+enum Records<'a> {
+    Csv(csv::Reader<Box<dyn Read + 'a>>),
+    Blanks { from: BufReader<Box<dyn Read + 'a>>, line: Vec<u8>, offset: u64 },
+}
+
+impl Records<'_> {
+    fn offset(&self) -> u64 {
+        match self {
+            Self::Csv(reader) => reader.position().byte(),
+            Self::Blanks { offset, .. } => *offset,
+        }
+    }
+
+    fn read(&mut self, row: &mut csv::ByteRecord, comment: Option<u8>) -> Result<bool, csv::Error> {
+        match self {
+            Self::Csv(reader) => reader.read_byte_record(row),
+            Self::Blanks { from, line, offset } => loop {
+                row.clear();
+                line.clear();
+                let count = from.read_until(b'\n', line).map_err(csv::Error::from)?;
+                if count == 0 {
+                    return Ok(false);
+                }
+                *offset += count as u64;
+                let text = line.trim_ascii();
+                if text.is_empty() || text.first().copied() == comment {
+                    continue;
+                }
+                if text.contains(&b'"') {
+                    split(&String::from_utf8_lossy(text), Delimiter::Blanks)
+                        .iter()
+                        .for_each(|f| row.push_field(f.as_bytes()));
+                } else {
+                    text.split(|b| matches!(b, b' ' | b'\t'))
+                        .filter(|f| !f.is_empty())
+                        .for_each(|f| row.push_field(f));
+                }
+                return Ok(true);
+            },
+        }
+    }
+}
+
+/// Calls `each` with every row: its byte offset, and its values in the order of `wanted`; NaN for missing ones.
+///
+/// # Errors
+/// [`RecordError::NotANumber`], [`RecordError::RaggedRow`], [`RecordError::BadTable`], [`RecordError::HeaderOnly`], and that
+/// of `each`.
+pub(crate) fn read_rows(
+    file: &SourceFile<'_>,
+    layout: &TextLayout,
+    wanted: &[WantedField],
+    tolerance: Tolerance,
+    mut each: impl FnMut(usize, &[f64]) -> Result<(), RecordError>,
+) -> Result<RowsRead, RecordError> {
+    let text = file.text.reader_at(layout.data_start).map_err(|source| file.unreadable(source))?;
+    let mut records = match layout.delimiter {
+        Delimiter::Byte(delimiter) => Records::Csv(
+            csv::ReaderBuilder::new()
+                .has_headers(false)
+                .flexible(true)
+                .delimiter(delimiter)
+                .comment(layout.comment)
+                .buffer_capacity(CHUNK_BYTES)
+                .from_reader(text),
+        ),
+        Delimiter::Blanks => {
+            Records::Blanks { from: BufReader::with_capacity(CHUNK_BYTES, text), line: Vec::new(), offset: 0 }
+        }
+    };
+    let width = layout.width();
+    let mut row = csv::ByteRecord::new();
+    let mut numbers = vec![0.0; wanted.len()];
+    let mut read = RowsRead { origins: vec![None; wanted.len()], ..RowsRead::default() };
+    let mut short: Option<(usize, RecordError)> = None;
+    loop {
+        let offset = layout.data_start + usize::try_from(records.offset()).unwrap_or(usize::MAX / 2);
+        match records.read(&mut row, layout.comment) {
+            Ok(true) => {}
+            Ok(false) => break,
+            Err(error) => {
+                return Err(RecordError::BadTable {
+                    path: file.path(),
+                    line: file.line_of_row(offset)?,
+                    message: error.to_string(),
+                });
+            }
+        }
+        if row.iter().all(|field| field.trim_ascii().is_empty()) {
+            continue;
+        }
+        if let Some((_, error)) = short.take() {
+            match tolerance {
+                Tolerance::Strict => return Err(error),
+                Tolerance::Lenient => read.add_ragged(error),
+            }
+        }
+        let empty_end =
+            row.len() == width + 1 && row.get(width).is_some_and(|field| field.trim_ascii().is_empty());
+        if row.len() != width && !empty_end {
+            if let (Tolerance::Lenient, Some(ragged)) = (tolerance, &mut read.ragged) {
+                ragged.0 += 1;
+                continue;
+            }
+            let error = RecordError::RaggedRow {
+                path: file.path(),
+                line: file.line_of_row(offset)?,
+                found: row.len(),
+                expected: width,
+                remedy: remedy_for_row(&row, layout),
+            };
+            // The last row of an interrupted log may be cut short.
+            let open_quote = row.iter().any(|field| field.contains(&b'\n') || field.contains(&b'\r'));
+            if row.len() > width || read.rows < MIN_ROWS_BEFORE_CUT || open_quote {
+                match tolerance {
+                    Tolerance::Strict => return Err(error),
+                    Tolerance::Lenient => read.add_ragged(error),
+                }
+                continue;
+            }
+            short = Some((offset, error));
+            continue;
+        }
+        for (at, field) in wanted.iter().enumerate() {
+            let bytes = row.get(field.index).unwrap_or_default();
+            numbers[at] = match value(layout, field, bytes, &mut read.origins[at]) {
+                Some(value) => value,
+                None if tolerance == Tolerance::Strict => {
+                    return Err(not_a_number(file, layout, offset, field, bytes)?);
+                }
+                None => {
+                    match read.bad_values.iter_mut().find(|bad| bad.field == at) {
+                        Some(bad) => bad.count += 1,
+                        None => {
+                            let first = not_a_number(file, layout, offset, field, bytes)?;
+                            let line = file.line_of_row(offset)?;
+                            read.bad_values.push(BadValues {
+                                field: at,
+                                count: 1,
+                                line,
+                                first: first.into(),
+                            });
+                        }
+                    }
+                    f64::NAN
+                }
+            };
+            if !numbers[at].is_finite() {
+                numbers[at] = f64::NAN;
+                if read.first_missing.is_none() {
+                    let text = String::from_utf8_lossy(bytes).trim().to_owned();
+                    read.first_missing = Some(MissingValue { offset, field: at, text });
+                }
+            }
+        }
+        read.rows += 1;
+        each(offset, &numbers)?;
+    }
+    read.cut_row = short.map(|(offset, _)| offset);
+    if read.rows == 0 && tolerance == Tolerance::Strict {
+        let line = layout.names_line.unwrap_or(layout.data_line);
+        return Err(RecordError::HeaderOnly { path: file.path(), line });
+    }
+    Ok(read)
+}
+
+/// The value of a field, NaN when it is missing, `None` when it is no number.
+#[inline]
+fn value(layout: &TextLayout, field: &WantedField, bytes: &[u8], origin: &mut Option<i64>) -> Option<f64> {
+    // The whole text is UTF-8; a delimiter cannot split a character.
+    let text = std::str::from_utf8(bytes).unwrap_or_default();
+    if field.kind == ColumnKind::Date {
+        return match parse_date_ns(text) {
+            // Division rounds correctly, multiplication by 1e-9 does not.
+            Some(ns) => Some((ns - *origin.get_or_insert(ns)) as f64 / 1e9),
+            None => is_missing(text.trim()).then_some(f64::NAN),
+        };
+    }
+    if field.from_first && (origin.is_some() || text.len() >= LARGE_DIGITS) {
+        let text = text.trim();
+        if text.len() >= LARGE_DIGITS
+            && let Ok(whole) = text.parse::<i64>()
+        {
+            return Some(whole.checked_sub(*origin.get_or_insert(whole))? as f64);
+        }
+        if let (Some(origin), Some(x)) = (*origin, parse_number(text, layout.decimal_comma)) {
+            return Some(x - origin as f64);
+        }
+    }
+    parse_number(text, layout.decimal_comma).or_else(|| is_missing(text.trim()).then_some(f64::NAN))
+}
+
+fn not_a_number(
+    file: &SourceFile<'_>,
+    layout: &TextLayout,
+    offset: usize,
+    field: &WantedField,
+    bytes: &[u8],
+) -> Result<RecordError, RecordError> {
+    let text = String::from_utf8_lossy(bytes).trim().to_owned();
+    let repeated = layout.names.get(field.index).is_some_and(|name| *name == text);
+    Ok(RecordError::NotANumber {
+        path: file.path(),
+        line: file.line_of_row(offset)?,
+        column: field.name.clone(),
+        remedy: if repeated {
+            "the names are repeated here: a second recording begins; put it into a file of its own"
+        } else {
+            remedy(&text, layout.decimal_comma)
+        },
+        text,
+    })
+}
+
+/// Remedy for a row with another number of fields than the header.
+fn remedy_for_row(row: &csv::ByteRecord, layout: &TextLayout) -> &'static str {
+    let integer = |field: &[u8]| !field.is_empty() && field.iter().all(|b| b.is_ascii_digit() || *b == b'-');
+    if row.iter().any(|field| field.contains(&b'\n') || field.contains(&b'\r')) {
+        "a quotation mark that is left open includes the following lines: close or remove it, or complete or remove the row"
+    } else if layout.delimiter == Delimiter::Byte(b',')
+        && row.len() > layout.width()
+        && row.iter().skip(1).any(integer)
+    {
+        "write decimal points instead of decimal commas, or put semicolons between the columns"
+    } else {
+        "complete or remove the row (the last line of an interrupted log is often cut short)"
+    }
+}
+
+fn remedy(text: &str, decimal_comma: bool) -> &'static str {
+    if text.contains(['\n', '\r']) {
+        "a quotation mark that is left open includes the following lines: close or remove it"
+    } else if parse_number(text, !decimal_comma).is_some() {
+        "decimal point and comma are mixed: write one of them, or give `decimal` in the column map"
+    } else {
+        "write a decimal number such as 0.0125 or 1.25e-2, leave the field empty, or remove the row"
+    }
+}
