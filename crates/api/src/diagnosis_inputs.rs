@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use stylet_diagnose::NamedRecording;
-use stylet_record::ReadOptions;
+use stylet_record::{ReadOptions, read_csv};
 
 /// Inputs of a diagnosis, as `inputs.json` holds them.
 #[derive(Clone, Debug, Serialize, Deserialize)]
