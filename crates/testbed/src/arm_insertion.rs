@@ -1,7 +1,7 @@
 //! An insertion by the arm: approach, zeroing of the virtual sensor, recording.
 
 use crate::arm_simulation::{ArmError, ArmSimulation};
-use crate::slide_insertion::{InsertionSample, SampleRates};
+use crate::slide_insertion::{InsertionSample, InstantVelocity, SampleRates};
 use stylet_dynamics::{Error, JointVector};
 use stylet_scenario::{ArmConfig, ArmInsertionLine, MotionPlan, VirtualSensor};
 use stylet_tissue::{ForceLaw, ForceLawState, Rupture};
@@ -56,14 +56,16 @@ pub fn simulate_on_arm(
     let mut zero = Zeroing::new(line.zero_window_s, physics_hz);
     let mut record = ArmRecording { zeroed_s: zero.until_s(physics_hz), ..ArmRecording::default() };
     let mut state = ForceLawState::default();
-    let mut previous_mps = first.velocity_mps;
+    let mut motion = InstantVelocity::new(first, 1.0 / physics_hz);
     for k in -before..rates.samples as i64 * steps {
         let time_s = k as f64 / physics_hz;
         let during_motion = |reason: Error| ArmError::DuringMotion { time_s, reason };
         let sampled = k >= 0 && k % steps == 0;
         let mut force = None;
+        let (mut velocity_mps, mut acceleration_mps2) = (0.0, 0.0);
         let arm_step = rig
-            .step(&line.commanded_at(plan, time_s), sampled, |position_m, velocity_mps| {
+            .step(&line.commanded_at(plan, time_s), sampled, |position_m, body_mps| {
+                (velocity_mps, acceleration_mps2) = motion.at_instant(body_mps);
                 if k < 0 {
                     return 0.0;
                 }
@@ -80,12 +82,12 @@ pub fn simulate_on_arm(
             sink(&InsertionSample {
                 time_s: (k / steps) as f64 / rates.sample_hz,
                 position_m: arm_step.position_m,
-                velocity_mps: arm_step.velocity_mps,
-                acceleration_mps2: (arm_step.velocity_mps - previous_mps) * physics_hz,
+                velocity_mps,
+                acceleration_mps2,
                 force,
             });
         }
-        previous_mps = arm_step.velocity_mps;
+        motion.advance(line.commanded_at(plan, (k + 1) as f64 / physics_hz));
         zero.step(k, &mut rig, &mut record.virtual_force_n).map_err(during_motion)?;
     }
     Ok(record)

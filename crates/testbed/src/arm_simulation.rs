@@ -34,7 +34,7 @@ pub struct ArmStep {
     pub q_rad: JointVector<7>,
     /// Axial position of the tip, m.
     pub position_m: f64,
-    /// Its velocity, m/s.
+    /// Its velocity over the step that ended here, m/s.
     pub velocity_mps: f64,
     /// Distance of the tip from the line, m.
     pub lateral_deviation_m: f64,

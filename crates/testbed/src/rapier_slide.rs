@@ -58,13 +58,13 @@ impl Slide {
         (body.translation().x, body.linvel().x)
     }
 
-    /// Advances by one step towards the commanded position and velocity, with the tissue resisting
-    /// with `resistance_n`.
+    /// Advances by one step to the commanded position, with the mean commanded velocity of the step, the tissue resisting with `resistance_n`.
     pub fn step(&mut self, position_m: f64, velocity_mps: f64, resistance_n: f64) {
         if let Some(joint) = self.world.impulse_joints.get_mut(self.joint, false) {
             joint.data.set_motor(
                 JointAxis::LinX,
-                position_m,
+                // rapier corrects the position error at the start of the step.
+                position_m - velocity_mps * self.dt_s,
                 velocity_mps,
                 MOTOR_STIFFNESS_N_PER_M,
                 MOTOR_DAMPING_NS_PER_M,

@@ -47,6 +47,43 @@ pub fn simulate_replay(
     }
 }
 
+/// Velocity and acceleration of a body at the instant of its position.
+///
+/// rapier integrates by semi-implicit Euler: the velocity of a body is the mean over the step that ended, half a step earlier than its position. The
+/// drive's deviation from the commanded mean of that step is added to the command of the instant.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct InstantVelocity {
+    commanded: MotionPoint,
+    /// Mean commanded velocity of the step that ended, m/s.
+    mean_mps: f64,
+    deviation_mps: f64,
+    dt_s: f64,
+}
+
+impl InstantVelocity {
+    /// At the first instant, where the body moves as commanded.
+    pub(crate) fn new(start: MotionPoint, dt_s: f64) -> Self {
+        let mean_mps = start.velocity_mps;
+        Self { commanded: start, mean_mps, deviation_mps: 0.0, dt_s }
+    }
+
+    /// Mean commanded velocity (m/s) of the step to `next`, which then ends there.
+    pub(crate) fn advance(&mut self, next: MotionPoint) -> f64 {
+        self.mean_mps = (next.position_m - self.commanded.position_m) / self.dt_s;
+        self.commanded = next;
+        self.mean_mps
+    }
+
+    /// Velocity (m/s) and acceleration (m/s²) at the instant, from the body's velocity over the step that ended.
+    pub(crate) fn at_instant(&mut self, body_mps: f64) -> (f64, f64) {
+        let deviation_mps = body_mps - self.mean_mps;
+        let deviation_mps2 = (deviation_mps - self.deviation_mps) / self.dt_s;
+        self.deviation_mps = deviation_mps;
+        let MotionPoint { velocity_mps, acceleration_mps2, .. } = self.commanded;
+        (velocity_mps + deviation_mps, acceleration_mps2 + deviation_mps2)
+    }
+}
+
 /// Slide: rapier moves the needle. The force law is evaluated at every physics step at the needle's actual position and velocity; its force acts
 /// on the needle.
 pub fn simulate_on_slide(
@@ -61,22 +98,17 @@ pub fn simulate_on_slide(
     let start = plan.at(0.0);
     let mut slide = Slide::new(start.position_m, start.velocity_mps, 1.0 / physics_hz);
     let mut state = ForceLawState::default();
-    let mut previous_mps = start.velocity_mps;
+    let mut motion = InstantVelocity::new(start, 1.0 / physics_hz);
     for k in 0..rates.samples * steps {
         let time_s = k as f64 / physics_hz;
-        let (position_m, velocity_mps) = slide.tip();
+        let (position_m, body_mps) = slide.tip();
+        let (velocity_mps, acceleration_mps2) = motion.at_instant(body_mps);
         let force = law.step(&mut state, time_s, position_m, velocity_mps, &mut on_rupture);
         if k % steps == 0 {
-            sink(&InsertionSample {
-                time_s: (k / steps) as f64 / rates.sample_hz,
-                position_m,
-                velocity_mps,
-                acceleration_mps2: (velocity_mps - previous_mps) * physics_hz,
-                force,
-            });
+            let time_s = (k / steps) as f64 / rates.sample_hz;
+            sink(&InsertionSample { time_s, position_m, velocity_mps, acceleration_mps2, force });
         }
-        previous_mps = velocity_mps;
         let next = plan.at((k + 1) as f64 / physics_hz);
-        slide.step(next.position_m, next.velocity_mps, force.total_n);
+        slide.step(next.position_m, motion.advance(next), force.total_n);
     }
 }
