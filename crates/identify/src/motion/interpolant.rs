@@ -15,15 +15,23 @@ pub(super) struct Interpolant {
     sum_z: Vec<f64>,
     /// Integral of the velocity in m up to each knot.
     sum_v: Vec<f64>,
+    /// Whether the velocity is that of the positions: between knots the motion then is a cubic, and the integral of the velocity a difference of
+    /// positions.
+    exact: bool,
 }
 
 impl Interpolant {
+    pub(super) fn new(exact: bool) -> Self {
+        Self { exact, ..Self::default() }
+    }
+
     pub(super) fn push(&mut self, t: f64, z: f64, v: f64) {
         let (mut sum_z, mut sum_v) = (0.0, 0.0);
         if let (Some(t0), Some(z0), Some(v0)) = (self.t.last(), self.z.last(), self.v.last()) {
             let dt = t - t0;
             sum_z = self.sum_z.last().unwrap_or(&0.0) + 0.5 * dt * (z0 + z);
-            sum_v = self.sum_v.last().unwrap_or(&0.0) + 0.5 * dt * (v0 + v);
+            let travel = if self.exact && dt > 0.0 { z - z0 } else { 0.5 * dt * (v0 + v) };
+            sum_v = self.sum_v.last().unwrap_or(&0.0) + travel;
         }
         self.t.push(t);
         self.z.push(z);
@@ -73,8 +81,16 @@ impl Interpolant {
         if k == last || dt <= 0.0 {
             return (self.sum_z[k] + dt * self.z[k], self.sum_v[k] + dt * self.v[k]);
         }
-        let share = dt / (self.t[k + 1] - self.t[k]);
+        let step = self.t[k + 1] - self.t[k];
+        let share = dt / step;
         let mix = |x: &[f64]| x[k] + 0.5 * share * (x[k + 1] - x[k]);
-        (self.sum_z[k] + dt * mix(&self.z), self.sum_v[k] + dt * mix(&self.v))
+        let travel = if self.exact {
+            // Hermite's cubic from positions and velocities at both knots.
+            let (v0, v1, mean) = (self.v[k], self.v[k + 1], (self.z[k + 1] - self.z[k]) / step);
+            dt * (v0 + share * (3.0 * mean - 2.0 * v0 - v1 + share * (v0 + v1 - 2.0 * mean)))
+        } else {
+            dt * mix(&self.v)
+        };
+        (self.sum_z[k] + dt * mix(&self.z), self.sum_v[k] + travel)
     }
 }

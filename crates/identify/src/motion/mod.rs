@@ -87,7 +87,14 @@ impl Motion {
         noise_m: f64,
         still_mps: f64,
     ) -> Self {
-        let mut m = Self { velocity_sd_mps: sd, noise_m, ..Self::default() };
+        let exact = sd <= MAX_EXACT_SD_MPS;
+        let mut m = Self {
+            exact: Interpolant::new(exact),
+            sampled: Interpolant::new(exact),
+            velocity_sd_mps: sd,
+            noise_m,
+            ..Self::default()
+        };
         let mut jumps = jumps.iter().peekable();
         for i in 0..t.len() {
             while let Some(jump) = jumps.next_if(|k| k.next_sample <= i) {
@@ -113,7 +120,7 @@ impl Motion {
             m.sampled.push(t[i], z[i], v[i]);
         }
         // Noisy positions do not distinguish a reversal from a hold.
-        if sd <= MAX_EXACT_SD_MPS {
+        if exact {
             m.find_reversals(t, still_mps);
         }
         m
