@@ -56,16 +56,6 @@ fn a_simulated_set_recovers_its_model_and_the_surface_shift() {
     }
     answers.numbers("surfaces", &model.days.iter().map(|d| d.surface_m).collect::<Vec<_>>());
     answers.numbers("frictions", &model.days.iter().map(|d| d.ln_friction).collect::<Vec<_>>());
-    answers.numbers(
-        "own",
-        &model
-            .per_recording
-            .iter()
-            .flat_map(|o| [o.surface_m, o.ln_friction, o.varying[0]])
-            .collect::<Vec<_>>(),
-    );
-    answers.numbers("instants", &model.rupture_times_s.concat());
-    answers.numbers("left", &[found.rms_n(), found.starts.0 as f64, found.starts.1 as f64]);
     // Leave-one-out error at the repeatability floor.
     let scores = leave_one_out_scores(&found, &recordings);
     let floors: Vec<f64> =

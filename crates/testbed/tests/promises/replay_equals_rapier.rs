@@ -145,7 +145,12 @@ fn position_velocity_and_acceleration_of_a_sample_belong_to_one_instant() {
     let program = Motion::Program {
         start_m: -0.005,
         segments: vec![
-            Segment::Ripple { velocity_mps: 0.004, amplitude_mps: 0.003, frequency_hz: 2.0, duration_s: 10.0 },
+            Segment::Ripple {
+                velocity_mps: 0.004,
+                amplitude_mps: 0.003,
+                frequency_hz: 2.0,
+                duration_s: 10.0,
+            },
             Segment::Hold { duration_s: 1.0023 },
             Segment::Move { velocity_mps: -0.004, duration_s: 5.0 },
         ],
@@ -162,8 +167,9 @@ fn position_velocity_and_acceleration_of_a_sample_belong_to_one_instant() {
             |_| {},
             |s| {
                 let command = plan.at(s.time_s);
-                let error =
-                    |what: f64, commanded: f64, limit: f64| assert!((what - commanded).abs() < limit, "{s:?}");
+                let error = |what: f64, commanded: f64, limit: f64| {
+                    assert!((what - commanded).abs() < limit, "{s:?}")
+                };
                 error(s.position_m, command.position_m, 1e-7);
                 error(s.velocity_mps, command.velocity_mps, 1e-5);
                 error(s.acceleration_mps2, command.acceleration_mps2, 1e-2);
