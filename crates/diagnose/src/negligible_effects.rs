@@ -20,9 +20,6 @@ pub struct Negligible {
 
 /// A cause changes the held-out RMS by at least this share of the noise.
 const MIN_RMS_CHANGE: f64 = 0.002;
-/// A lag or delay below this share of the sampling interval is negligible: position and force of one row are not
-/// synchronised better, and half a step of a simulation at 1 kHz is a tenth of one at 200 Hz.
-const MIN_DELAY_STEPS: f64 = 0.12;
 /// A tissue motion below this share of the encoder noise is negligible.
 const MIN_MOTION_NOISE_SHARE: f64 = 0.1;
 /// A cause that explains less than this many nats per block must improve the held-out RMS.
@@ -109,15 +106,7 @@ fn acts_in_every_sample(info: &EffectInfo) -> bool {
 /// Why a parameter is below the resolution of the instrument.
 fn unresolved(search: &Search, k: usize) -> Option<String> {
     let choice = &search.best.model.effects[k];
-    let step_s = search.data.recordings.iter().map(|b| b.sample_step_s).fold(f64::INFINITY, f64::min);
     for (p, value) in choice.info.parameters.iter().zip(&choice.values) {
-        if p.strength
-            && p.unit == "s"
-            && choice.info.stage == ChainStage::Sensor
-            && *value < MIN_DELAY_STEPS * step_s
-        {
-            return Some("below an eighth of the sampling interval".to_owned());
-        }
         if p.strength && p.unit == "m" && choice.info.proposal == Proposal::TissueMotion {
             let noise_m = search.data.recordings.iter().map(|b| b.motion.noise_m).fold(0.0, f64::max);
             if *value < MIN_MOTION_NOISE_SHARE * noise_m {

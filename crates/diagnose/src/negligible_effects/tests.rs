@@ -8,7 +8,7 @@ use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::{FitData, Residuals};
 use stylet_identify::model::{EffectTerm, Model};
 use stylet_identify::noise::Noise;
-use stylet_tissue::{AnyEffect, CoulombFriction, Effect, ForceBias, ForceDrift, LowPassLag, Respiration};
+use stylet_tissue::{AnyEffect, CoulombFriction, Effect, ForceBias, ForceDrift, Respiration};
 
 fn cause(effect: &str, gain_nats: f64) -> Cause {
     Cause {
@@ -42,10 +42,7 @@ fn search(effects: &[AnyEffect]) -> Search {
 }
 
 #[test]
-fn delays_and_motions_below_the_resolution_are_negligible() {
-    let lag = |time_constant_s: f64| unresolved(&search(&[LowPassLag { time_constant_s }.into()]), 0);
-    assert_eq!(lag(1.1e-3).as_deref(), Some("below an eighth of the sampling interval"));
-    assert_eq!(lag(1.3e-3), None);
+fn motions_below_the_resolution_of_the_encoder_are_negligible() {
     let noise_m = search(&[]).data.recordings.iter().map(|b| b.motion.noise_m).fold(0.0, f64::max);
     assert!(noise_m > 1e-6, "{noise_m}");
     let breath = |amplitude_m: f64| {

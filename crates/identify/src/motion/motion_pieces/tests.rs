@@ -96,13 +96,26 @@ fn a_piece_has_the_acceleration() {
     // v = 1 + 3 t, linear everywhere.
     let t: Vec<f64> = (0..20).map(|k| 0.1 * f64::from(k)).collect();
     let v: Vec<f64> = t.iter().map(|t| 1.0 + 3.0 * t).collect();
-    let m = from_knots(&t, &[0.25; 20], &v, &[], 0.0, 0.0);
+    // Noisy positions: the velocity does not belong to them.
+    let m = from_knots(&t, &[0.25; 20], &v, &[], 1e-3, 0.0);
     for p in pieces(&m, &[(0.23, 0.61), (0.61, 0.75), (1.0, 1.1)], JumpAppearance::BetweenSamples) {
         assert!((p.acceleration_mps2 - 3.0).abs() < 1e-9, "{p:?}");
         assert_close(p.velocity_mps, 1.0 + 1.5 * (p.start_s + p.end_s));
         assert_close(p.position_m, 0.25);
         assert_close(p.at(p.start_s).1, 1.0 + 3.0 * p.start_s);
         assert_close(p.at(p.end_s).0, 0.25 + p.velocity_mps * 0.5 * (p.end_s - p.start_s));
+    }
+}
+
+#[test]
+fn the_mean_velocity_of_exact_positions_is_exact_for_a_cubic_motion() {
+    let position = |t: f64| 2.0 * t * t - t * t * t;
+    let t: Vec<f64> = (0..20).map(|k| 0.1 * f64::from(k)).collect();
+    let z: Vec<f64> = t.iter().map(|t| position(*t)).collect();
+    let v: Vec<f64> = t.iter().map(|t| 4.0 * t - 3.0 * t * t).collect();
+    let m = from_knots(&t, &z, &v, &[], 0.0, 0.0);
+    for p in pieces(&m, &[(0.23, 0.61), (0.61, 0.75), (1.0, 1.1)], JumpAppearance::BetweenSamples) {
+        assert_close(p.velocity_mps, (position(p.end_s) - position(p.start_s)) / (p.end_s - p.start_s));
     }
 }
 

@@ -257,3 +257,15 @@ fn quantisation_of_1_um_gives_velocity_to_10_um_per_second() {
     assert!(off[off.len() * 95 / 100] < 1e-5, "{}", off[off.len() * 95 / 100]);
     assert!(found.sd_mps < 1e-5, "{}", found.sd_mps);
 }
+
+#[test]
+fn the_velocity_of_exact_positions_follows_a_ripple_of_two_hertz() {
+    let omega = core::f64::consts::TAU * 2.0;
+    let t: Vec<f64> = (0..600).map(|k| 0.005 * f64::from(k)).collect();
+    let z: Vec<f64> = t.iter().map(|t| 0.004 * t + 0.002 / omega * (omega * t).sin()).collect();
+    let found = estimate_velocity(&t, &z);
+    for (v, t) in found.velocity_mps.iter().zip(&t).skip(2).take(596) {
+        let expected = 0.004 + 0.002 * (omega * t).cos();
+        assert!((v - expected).abs() < 1e-8, "{v} for {expected} m/s at {t} s");
+    }
+}
