@@ -7,7 +7,7 @@ use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::{Effort, Fit, fit, fit_from_zero_scatter};
 use stylet_identify::force_drops::{ForceDrop, detect_force_drops};
 use stylet_identify::likelihood::{FitData, residuals};
-use stylet_identify::model::{Assumptions, EffectTerm, Model};
+use stylet_identify::model::{Assumptions, EffectTerm, Model, ZeroStep};
 use stylet_identify::noise::{Noise, NoiseSource};
 use stylet_identify::rupture_assignment::assign_ruptures;
 use stylet_identify::update_event_times::update_event_times;
@@ -19,7 +19,9 @@ pub struct PreparedRecordings {
     pub assumed: Arc<Assumptions>,
     /// Blocks of each recording.
     pub blocks: Arc<Vec<BlockAverages>>,
-    /// Force drops of each recording.
+    /// Steps of the sensor's zero of each recording.
+    pub zero_steps: Vec<Vec<ZeroStep>>,
+    /// Force drops of each recording that are no step of the zero.
     pub drops: Vec<Vec<ForceDrop>>,
     /// Lower bound of the noise standard deviation, in N.
     pub min_noise_sd_n: f64,
@@ -30,13 +32,30 @@ impl PreparedRecordings {
     #[must_use]
     pub fn new(assumed: Arc<Assumptions>, blocks: Vec<BlockAverages>, min_noise_sd_n: f64) -> Self {
         let drops = blocks.par_iter().map(detect_force_drops).collect();
-        Self { assumed, blocks: Arc::new(blocks), drops, min_noise_sd_n }
+        let zero_steps = vec![Vec::new(); blocks.len()];
+        Self { zero_steps, assumed, blocks: Arc::new(blocks), drops, min_noise_sd_n }
+    }
+
+    /// The same recordings with these steps of the zero, which are no ruptures.
+    #[must_use]
+    pub fn with_zero_steps(&self, zero_steps: Vec<Vec<ZeroStep>>) -> Self {
+        let mut drops: Vec<Vec<ForceDrop>> = self.blocks.par_iter().map(detect_force_drops).collect();
+        for (drops, steps) in drops.iter_mut().zip(&zero_steps) {
+            drops.retain(|d| steps.iter().all(|s| (s.time_s - d.time_s).abs() > SAME_EVENT_S));
+        }
+        Self { zero_steps, drops, ..self.clone() }
     }
 
     /// Times (s) of the drops of each recording.
     #[must_use]
     pub fn drop_times(&self) -> Vec<Vec<f64>> {
         self.drops.iter().map(|d| d.iter().map(|d| d.time_s).collect()).collect()
+    }
+
+    /// Largest minus smallest force in N, which an offset does not change.
+    fn force_range_n(&self) -> f64 {
+        let all = || self.blocks.iter().flat_map(|b| &b.force_n);
+        all().fold(f64::NEG_INFINITY, |m, f| m.max(*f)) - all().fold(f64::INFINITY, |m, f| m.min(*f))
     }
 
     /// Largest force in N.
@@ -46,6 +65,8 @@ impl PreparedRecordings {
     }
 }
 
+/// A force drop this close (s) to a step of the zero is that step.
+pub(crate) const SAME_EVENT_S: f64 = 0.12;
 /// Noise of the first fit as a share of the largest force: large enough that details cannot trap it.
 const FIRST_NOISE_SHARE: f64 = 0.03;
 
@@ -125,6 +146,14 @@ pub fn coarse_refit(
     fit(&with_updated_times(model, coarse, &prepared.drop_times()), coarse, COARSE_EFFORT)
 }
 
+/// Fits the base law with these effects from the prior; returns the fit and the data with the noise estimated from it.
+pub(crate) fn fit_with_baseline(
+    prepared: &PreparedRecordings,
+    effects: &[EffectTerm],
+) -> Option<(Fit, FitData)> {
+    fit_from_prior(prepared, effects, (false, false))
+}
+
 /// Refits the base law with a surface position and a friction factor per recording, where that reduces the objective so
 /// much that the first fit must have mistaken differences between recordings for ruptures.
 #[must_use]
@@ -163,10 +192,14 @@ fn fit_with_assigned_drops(
     random_effects: RandomEffects,
 ) -> Option<(Fit, FitData)> {
     let rough_n = roughness(&prepared.blocks);
-    let wide_noise = Noise::white(rough_n.max(FIRST_NOISE_SHARE * prepared.largest_force_n()));
+    // An offset is no force of the tissue.
+    let baseline = effects.iter().any(|e| e.info.baseline);
+    let largest_n = if baseline { prepared.force_range_n() } else { prepared.largest_force_n() };
+    let wide_noise = Noise::white(rough_n.max(FIRST_NOISE_SHARE * largest_n));
     let data = FitData::new(Arc::clone(&prepared.blocks), wide_noise, prepared.min_noise_sd_n);
     let mut start = Model::base(Arc::clone(&prepared.assumed), prepared.blocks.len());
     start.free.wide_thickness = true;
+    start.zero_steps.clone_from(&prepared.zero_steps);
     (start.free.recording_surface, start.free.recording_friction) = random_effects;
     let model = effects.iter().fold(start, |m, choice| m.with_effect(choice.clone()));
     let mut best: Option<Fit> = None;

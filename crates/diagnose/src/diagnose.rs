@@ -1,6 +1,7 @@
 //! Diagnosis of recordings: which effects the scenario lacks, with intervals, and the improvement on held-out
 //! recordings.
 
+use crate::baseline_search::search_with_baseline;
 use crate::base_law_fit::{PreparedRecordings, fit_base_law, refit_with_random_effects};
 use crate::competing_effects::{CompetingEffect, find_competing_effects};
 use crate::diagnosis_json::*;
@@ -16,13 +17,14 @@ use crate::negligible_effects::{Negligible, negligible_effects};
 use crate::random_effect_selection::select_random_effects;
 use crate::selection_state::{Search, SearchStage};
 use crate::sensor_artefact_causes::sensor_artefact_causes;
+use crate::zero_steps::{ZeroStepReport, zero_effects};
 use crate::verdict::{Assessment, assess_search, is_kept, move_negligible};
 use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
 use stylet_identify::model::Assumptions;
 use stylet_scenario::Scenario;
-use stylet_tissue::AnyEffect;
+use stylet_tissue::{AnyEffect, Effect};
 
 /// Options of a diagnosis.
 #[derive(Clone, Copy, Debug, Default)]
@@ -76,7 +78,7 @@ pub fn diagnose(
     let (base, data) = fit_base_law(&prepared).ok_or(DiagnoseError::NoFit)?;
     let (base, data) = select_random_effects(base, data);
     let (base, data) = refit_with_random_effects(&prepared, base, data);
-    let mut search = Search::run(&prepared, base, data, &mut progress);
+    let (mut search, prepared) = search_with_baseline(&prepared, base, data, &mut progress);
     let mut competing = find_competing_effects(&mut search);
     progress("assessing the residual");
     let mut assessment = assess_search(&mut search, &competing);
@@ -128,6 +130,7 @@ pub fn diagnose(
         negligible = move_negligible(&mut assessment, small);
     }
     let mut artefacts = sensor_artefact_causes(&raw, noise_n);
+    let steps = ZeroStepReport::new(&search);
     if assessment.unknown {
         let results = jackknife_effects(&search.best, &search.data, noise_n);
         let effects = search.best.model.effects.iter().zip(&results);
@@ -143,6 +146,7 @@ pub fn diagnose(
         negligible.extend(move_negligible(&mut assessment, dropped));
     }
     let mut causes = assessment.causes;
+    steps.add_to(&mut causes);
     // Without an identified effect the base law is the final model.
     let extended_held_out =
         if has_cause(&search, &causes) { extended_held_out } else { base_held_out.clone() };
@@ -258,7 +262,8 @@ fn search_step(stage: &SearchStage) -> SearchStep {
 
 /// Whether any effect of the best model is a cause.
 fn has_cause(search: &Search, causes: &[Cause]) -> bool {
-    search.best.model.effects.iter().any(|e| causes.iter().any(|c| c.effect == e.info.id))
+    search.best.model.zero_step_count() > 0
+        || search.best.model.effects.iter().any(|e| causes.iter().any(|c| c.effect == e.info.id))
 }
 
 /// The scenario with the identified effects.
@@ -267,9 +272,12 @@ fn extended_scenario(scenario: &Scenario, search: &Search, d: &Diagnosis) -> Sce
     let none = search.best.model.effects.is_empty() && d.verdict != Verdict::Unknown;
     let source = if none || has_cause(search, &d.causes) { &search.best } else { &search.base };
     out.tissue = source.model.tissue.clone();
+    out.effects.extend(zero_effects(search, &d.causes));
     let named = |id: &str| d.causes.iter().any(|c| c.effect == id);
     out.effects.extend(source.model.effects.iter().filter(|e| named(e.info.id)).filter_map(|e| e.effect()));
-    for c in d.causes.iter().filter(|c| source.model.effects.iter().all(|e| e.info.id != c.effect)) {
+    let given: Vec<&str> = out.effects.iter().map(Effect::id).collect();
+    let missing: Vec<&Cause> = d.causes.iter().filter(|c| !given.contains(&c.effect.as_str())).collect();
+    for c in missing.into_iter().filter(|c| source.model.effects.iter().all(|e| e.info.id != c.effect)) {
         let Some(info) = stylet_tissue::effect_info(&c.effect) else { continue };
         let values: Vec<f64> =
             info.parameters.iter().filter_map(|p| c.parameters.get(p.path)).map(|e| e.value).collect();

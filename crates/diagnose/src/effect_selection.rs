@@ -44,12 +44,17 @@ impl Search {
         data: FitData,
         progress: &mut impl FnMut(&str),
     ) -> Self {
-        let mut search = Self {
-            restarts: MAX_RESTARTS,
-            prior_refits: MAX_PRIOR_STAGES,
-            stages: Vec::new(),
-            ..Self::from_fit(base, data)
-        };
+        Self::run_from(Self::from_fit(base, data), prepared, progress)
+    }
+
+    /// Continues the selection from a model that may have effects already.
+    #[must_use]
+    pub(crate) fn run_from(
+        start: Self,
+        prepared: &PreparedRecordings,
+        progress: &mut impl FnMut(&str),
+    ) -> Self {
+        let mut search = Self { restarts: MAX_RESTARTS, prior_refits: MAX_PRIOR_STAGES, ..start };
         loop {
             let count = search.best.model.effects.len();
             progress(&format!("searching for {} effect", if count == 0 { "an" } else { "another" }));

@@ -6,6 +6,7 @@
 //! |---|---|
 //! | `input_checks` | units, signs and reach of the recordings |
 //! | [`base_law_fit`], [`random_effect_selection`] | fit of the base law and of what differs between recordings |
+//! | `baseline_search`, `zero_steps` | offset, drift, force linear in position, steps of the zero: before all other effects |
 //! | [`effect_start_values`], [`tone_detection`] | first-order gain and start values of every effect |
 //! | [`effect_selection`], [`model_comparison`] | forward selection by penalised gain, and pruning |
 //! | [`geometry_selection`] | fixed or free layer boundaries, position scale, shifted boundaries |
@@ -20,6 +21,7 @@
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
 pub mod base_law_fit;
+mod baseline_search;
 mod bootstrap_noise;
 pub mod competing_effects;
 pub mod confidence_intervals;
@@ -53,6 +55,7 @@ mod test_fixtures;
 pub mod tone_detection;
 pub mod varying_coefficient_test;
 mod verdict;
+mod zero_steps;
 
 pub use competing_effects::EQUIVALENCE_NATS;
 pub use diagnose::{DiagnosisResult, Options, REASON_IMITATES_UNMODELLED, assumptions_of, diagnose};

@@ -10,6 +10,7 @@
 //! | [`motion`] | base motion between samples: position, velocity, velocity jumps |
 //! | [`block_averages`] | a recording as means over blocks of 20 ms |
 //! | [`insertion_phases`], [`force_drops`] | motion phases and abrupt force changes; force drops by local regression |
+//! | [`force_jumps`] | jumps of either sign between two samples |
 //! | [`rupture_assignment`] | which force drop belongs to which layer |
 //! | [`model`] | the fitted model: parameters with priors and bounds |
 //! | [`forward_model`] | force prediction with imposed rupture times or the law's own |
@@ -29,6 +30,7 @@ pub mod discrepancy_noise;
 pub mod evidence_nats;
 pub mod fit;
 pub mod force_drops;
+pub mod force_jumps;
 pub mod forward_model;
 pub mod insertion_phases;
 pub mod likelihood;

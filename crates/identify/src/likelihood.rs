@@ -136,6 +136,7 @@ pub fn replay(model: &Model, data: &FitData, r: usize) -> Option<ReplayResult> {
         &mut out,
     );
     data.count_replayed(blocks.len() as u64);
+    model.add_zero_steps(r, blocks, &mut out.force_n);
     out.force_n.iter().all(|f| f.is_finite()).then_some(out)
 }
 
@@ -177,13 +178,14 @@ impl ReplayCache {
         let compiled = model.compile(r)?;
         // On average half of the recording is replayed.
         data.count_replayed(data.recordings[r].len() as u64 / 2);
-        let out = self.incremental.replay_neighbour(
+        let mut out = self.incremental.replay_neighbour(
             &self.compiled,
             &compiled,
             &data.recordings[r],
             &self.pieces,
             &model.rupture_times_s[r],
         );
+        model.add_zero_steps(r, &data.recordings[r], &mut out.force_n);
         out.force_n.iter().all(|f| f.is_finite()).then_some(out)
     }
 
@@ -198,8 +200,9 @@ impl ReplayCache {
     pub fn nats_with_ruptures(&self, model: &Model, data: &FitData, r: usize, rupture_times: &[f64]) -> f64 {
         let b = &data.recordings[r];
         data.count_replayed(b.len() as u64 / 2);
-        let now =
+        let mut now =
             self.incremental.replay_neighbour(&self.compiled, &self.compiled, b, &self.pieces, rupture_times);
+        model.add_zero_steps(r, b, &mut now.force_n);
         let e: Vec<f64> = b.force_n.iter().zip(&now.force_n).map(|(y, f)| y - f).collect();
         let w = data.whiten(r, &e);
         let events: f64 = now.ruptures.iter().map(|e| evaluate_rupture(e, &model.scatter).nats).sum();

@@ -382,6 +382,7 @@ fn effect_parameter_count(c: &Candidate) -> usize {
 fn single_recording_model(model: &Model, rupture_times: Vec<f64>) -> Model {
     let mut model = model.clone();
     model.per_recording = vec![RecordingParameters::default()];
+    model.zero_steps = vec![Vec::new()];
     let layers = model.layers();
     model.rupture_times_s =
         vec![if rupture_times.len() == layers { rupture_times } else { vec![NO_RUPTURE; layers] }];

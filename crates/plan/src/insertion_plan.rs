@@ -268,6 +268,7 @@ fn interval_changes(
                 ParameterRole::RecordingSurface
                 | ParameterRole::RecordingFriction
                 | ParameterRole::RecordingEffect(_)
+                | ParameterRole::ZeroStep(_)
                 | ParameterRole::RuptureTime(_) => String::new(),
             },
             half_width_before: stylet_stats::Z95 * before,

@@ -166,6 +166,7 @@ impl ForceSensor {
         let spikes: f64 = self.spikes.iter_mut().map(Spikes::draw).sum();
         let reading = SensorInput {
             time_s,
+            position_m: at.position_m,
             velocity_mps: at.velocity_mps,
             acceleration_mps2: at.acceleration_mps2,
             tissue_n,

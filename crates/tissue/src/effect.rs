@@ -175,7 +175,7 @@ pub trait Effect {
 
     /// [`ChainStage::Tool`]: a force in N added between tissue and sensor, from velocity (m/s) and acceleration (m/s²) of
     /// the needle's base.
-    fn tool_force(&self, _v_mps: f64, _a_mps2: f64) -> f64 {
+    fn tool_force(&self, _z_m: f64, _v_mps: f64, _a_mps2: f64) -> f64 {
         0.0
     }
 
@@ -274,7 +274,7 @@ mod tests {
         assert_eq!(none.sensor_output(1.0, 0.1, 0.7, &mut state), 0.7);
         assert_eq!(none.mean_sensor_output(1.0, 0.1, 20.0, 0.7, &mut state), 0.7);
         assert_eq!((none.position_factor(), none.delay_s(), none.membrane_depth_m()), (1.0, 0.0, None));
-        assert_eq!((none.retained_force(0.7), none.tool_force(0.01, 2.0)), (0.0, 0.0));
+        assert_eq!((none.retained_force(0.7), none.tool_force(0.02, 0.01, 2.0)), (0.0, 0.0));
         assert_eq!(none.shaft_force(&tip, 0.02, &mut state), 0.0);
         assert_eq!(none.layer_friction(&tip, &[], 0.01, &mut state), 0.0);
         assert_eq!(none.tip_force(&tip, &[], &mut state), 0.0);

@@ -27,6 +27,9 @@ pub struct EffectInfo {
     /// Whether the effect also fits forces of another origin: a tone or a tissue motion fits any periodic force, presliding
     /// friction any hysteresis at a reversal. Together with an unmodelled force such an effect needs stronger evidence.
     pub absorbs_unmodelled: bool,
+    /// Whether it belongs to the sensor's baseline: a force in air too, of any size and sign, that does not depend on the
+    /// tissue. Such effects are searched for before all others.
+    pub baseline: bool,
 }
 
 impl EffectInfo {
@@ -42,6 +45,7 @@ impl EffectInfo {
         proposal: Proposal::PerLayer,
         nested_in: &[],
         absorbs_unmodelled: false,
+        baseline: false,
     };
 
     /// The parameter of this path, including further terms of the extended form.
@@ -117,6 +121,8 @@ pub struct ParameterInfo {
     pub log: bool,
     /// Whether only integers are valid.
     pub integer: bool,
+    /// Whether it is the frequency of a clock of its own, independent of the commanded motion.
+    pub clock: bool,
     /// Typical standard deviation between recordings; zero for a parameter that is common to all.
     pub between_recordings_sd: f64,
     /// Normal prior (mean, standard deviation) from other measurements, where one data set does not identify it.
@@ -151,6 +157,7 @@ impl ParameterInfo {
             demonstration: None,
             log: false,
             integer: false,
+            clock: false,
             between_recordings_sd: 0.0,
             measured_prior: None,
         }
@@ -194,6 +201,11 @@ impl ParameterInfo {
     /// Normal prior with this mean and standard deviation.
     pub(crate) const fn measured_prior(self, mean: f64, sd: f64) -> Self {
         Self { measured_prior: Some((mean, sd)), ..self }
+    }
+
+    /// The frequency of a clock of its own.
+    pub(crate) const fn clock(self) -> Self {
+        Self { clock: true, ..self }
     }
 
     /// Integers only.

@@ -1,7 +1,7 @@
 //! From the force of the tissue to the recorded one: tool, sensor, recorded position (docs/reference/model.md, Measurement
 //! chain).
 //!
-//! tool (`m a`, drive friction) -> gain -> low-pass -> delay -> bias, drift -> interference -> noise and spikes (drawn by
+//! tool (`m a`, drive friction, force linear in position) -> gain -> low-pass -> delay -> bias, drift, steps of the zero -> interference -> noise and spikes (drawn by
 //! the caller) -> saturation -> quantisation.
 
 use crate::chain_stage::ChainStage;
@@ -37,6 +37,8 @@ pub struct MeasurementState {
 pub struct SensorInput {
     /// Time in seconds; must not run backwards.
     pub time_s: f64,
+    /// Position of the needle's base in m.
+    pub position_m: f64,
     /// Velocity of the needle's base in m/s.
     pub velocity_mps: f64,
     /// Acceleration of the needle's base in m/s².
@@ -56,6 +58,8 @@ pub struct AveragingInterval {
     pub span_s: f64,
     /// Number of sensor samples in it, evenly spaced.
     pub samples: f64,
+    /// Mean position of the needle's base in m.
+    pub position_m: f64,
     /// Mean velocity of the needle's base in m/s.
     pub velocity_mps: f64,
     /// Mean acceleration of the needle's base in m/s².
@@ -123,7 +127,7 @@ impl MeasurementChain {
         state.time_s = Some(time_s);
         let mut force = reading.tissue_n;
         for effect in &self.tool {
-            force += effect.tool_force(reading.velocity_mps, reading.acceleration_mps2);
+            force += effect.tool_force(reading.position_m, reading.velocity_mps, reading.acceleration_mps2);
         }
         for (effect, state_of_effect) in self.before_delay.iter().zip(&mut state.effects) {
             force = effect.sensor_output(time_s, dt_s, force, state_of_effect);
@@ -161,7 +165,7 @@ impl MeasurementChain {
     pub fn mean_force(&self, state: &mut MeasurementState, interval: &AveragingInterval) -> f64 {
         let mut force = interval.tissue_n;
         for effect in &self.tool {
-            force += effect.tool_force(interval.velocity_mps, interval.acceleration_mps2);
+            force += effect.tool_force(interval.position_m, interval.velocity_mps, interval.acceleration_mps2);
         }
         for (effect, state_of_effect) in self.before_delay.iter().zip(&mut state.effects) {
             force = effect.mean_sensor_output(
@@ -190,7 +194,7 @@ impl MeasurementChain {
     pub fn force_at_end(&self, state: &mut MeasurementState, interval: &AveragingInterval) -> f64 {
         let mut force = interval.tissue_n;
         for effect in &self.tool {
-            force += effect.tool_force(interval.velocity_mps, interval.acceleration_mps2);
+            force += effect.tool_force(interval.position_m, interval.velocity_mps, interval.acceleration_mps2);
         }
         for (effect, state_of_effect) in self.before_delay.iter().zip(&mut state.effects) {
             force = effect.sensor_output_at_end(interval.time_s, interval.span_s, force, state_of_effect);

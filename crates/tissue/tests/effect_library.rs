@@ -6,7 +6,7 @@ use common::*;
 use proptest::prelude::*;
 use stylet_tissue::*;
 
-const GENERAL_EFFECTS: [&str; 27] = [
+const GENERAL_EFFECTS: [&str; 30] = [
     "nonlinear_elasticity",
     "stress_relaxation",
     "coulomb_friction",
@@ -34,6 +34,9 @@ const GENERAL_EFFECTS: [&str; 27] = [
     "quantisation",
     "position_scale",
     "force_spikes",
+    "zero_step",
+    "position_dependent_force",
+    "loading_hysteresis",
 ];
 
 #[test]
@@ -163,7 +166,7 @@ proptest! {
         let mut state = chain.start(200.0);
         for (k, &(time_s, z, velocity_mps)) in motion.iter().enumerate() {
             let tissue_n = f64::from_bits(base[3 * k]);
-            let reading = SensorInput { time_s, velocity_mps, acceleration_mps2: 1.0, tissue_n, noise_n: 0.0 };
+            let reading = SensorInput { time_s, position_m: z, velocity_mps, acceleration_mps2: 1.0, tissue_n, noise_n: 0.0 };
             prop_assert_eq!(chain.step(&mut state, &reading).to_bits(), base[3 * k]);
             prop_assert_eq!(chain.recorded_position(z).to_bits(), z.to_bits());
         }

@@ -74,6 +74,9 @@ fn effects() -> Vec<Effect> {
         Quantisation { step_n: 0.05 },
         PositionScale { eps: 0.03 },
         ForceSpikes { rate_hz: 0.5, size_n: 1.0 },
+        ZeroStep { time_s: 9.2, step_n: -0.4 },
+        PositionDependentForce { stiffness_n_per_m: 8.0, rest_m: -0.01 },
+        LoadingHysteresis { fraction: 0.3, reversal_n: 0.06 },
     ]
 }
 
@@ -114,7 +117,7 @@ fn library(effect: Option<&Effect>) -> Vec<f64> {
         let p = path.at(piece, time_s);
         let tissue_n = law.step(&mut state, time_s, p.z, p.v, |_| {}).total_n;
         let reading =
-            SensorInput { time_s, velocity_mps: p.v, acceleration_mps2: p.a, tissue_n, noise_n: 0.0 };
+            SensorInput { time_s, position_m: p.z, velocity_mps: p.v, acceleration_mps2: p.a, tissue_n, noise_n: 0.0 };
         let force = chain.step(&mut measuring, &reading);
         if k % 50 == 0 {
             out.push(force);

@@ -34,14 +34,39 @@ fn tool_effects_follow_the_bases_motion_in_air_too() {
 }
 
 #[test]
+fn a_force_linear_in_position_is_zero_at_its_rest_position_in_air_too() {
+    let chain =
+        MeasurementChain::new(&[PositionDependentForce { stiffness_n_per_m: -20.0, rest_m: -0.01 }.into()]);
+    let mut state = chain.start(200.0);
+    for (position_m, expected) in [(-0.01, 0.0), (0.0, -0.2), (0.04, -1.0), (-0.02, 0.2)] {
+        let reading = SensorInput { position_m, velocity_mps: 0.01, ..SensorInput::default() };
+        near(chain.step(&mut state, &reading), expected, 1e-15);
+    }
+}
+
+#[test]
+fn steps_of_the_zero_add_up_and_count_in_a_mean_by_the_time_after_them() {
+    let step = |time_s: f64, step_n: f64| ZeroStep { time_s, step_n }.into();
+    let chain = MeasurementChain::new(&[step(1.0, 0.3), step(2.0, -0.5)]);
+    let mut state = chain.start(200.0);
+    let mean = |time_s, state: &mut _| {
+        chain.mean_force(state, &AveragingInterval { time_s, span_s: 0.02, ..AveragingInterval::default() })
+    };
+    for (time_s, expected) in [(0.9, 0.0), (0.995, 0.075), (1.0, 0.15), (1.5, 0.3), (2.005, -0.075), (3.0, -0.2)] {
+        near(mean(time_s, &mut state), expected, 1e-12);
+    }
+}
+
+#[test]
 fn each_effect_of_the_sensor_is_its_equation() {
     let times = regular(100.0, 2.0);
     let force = |t: f64| 3.0 * (2.0 * t).sin();
     type Expected<'a> = &'a dyn Fn(f64, f64) -> f64; // of force and time
-    let checks: [(AnyEffect, Expected); 6] = [
+    let checks: [(AnyEffect, Expected); 7] = [
         (ForceGain { eps: 0.1 }.into(), &|f, _| 1.1 * f),
         (ForceBias { force_n: -0.2 }.into(), &|f, _| f - 0.2),
         (ForceDrift { rate_n_per_s: 0.05 }.into(), &|f, t| f + 0.05 * t),
+        (ZeroStep { time_s: 0.795, step_n: -0.4 }.into(), &|f, t| if t < 0.795 { f } else { f - 0.4 }),
         (PeriodicInterference { amplitude_n: 0.3, frequency_hz: 7.0, phase_rad: 0.5 }.into(), &|f, t| {
             f + 0.3 * (std::f64::consts::TAU * 7.0 * t + 0.5).sin()
         }),
@@ -171,10 +196,11 @@ fn the_mean_over_intervals_is_that_of_many_samples() {
             let time_s = span_s * (f64::from(k) + (f64::from(i) + 0.5) / f64::from(readings));
             sum += chain.step(
                 &mut fine,
-                &SensorInput { time_s, velocity_mps: 0.01, acceleration_mps2, tissue_n, noise_n: 0.0 },
+                &SensorInput { time_s, position_m: 0.0, velocity_mps: 0.01, acceleration_mps2, tissue_n, noise_n: 0.0 },
             );
         }
         let cell = AveragingInterval {
+            position_m: 0.0,
             time_s: span_s * (f64::from(k) + 0.5),
             span_s,
             samples: f64::from(readings),

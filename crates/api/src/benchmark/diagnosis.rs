@@ -75,7 +75,7 @@ impl CaseSelection<'_> {
         if !plan.only.is_empty() && plan.cases().is_empty() {
             return Err(Error::Request(format!(
                 "--effect {}: none of these cases hides it; effects are hidden by `--hide one` in the plain world, other shapes by `--hide \
-                 outside`, and each of the 27 effects (16 shapes) once in as many cases of a row",
+                 outside`, and each of the 30 effects (16 shapes) once in as many cases of a row",
                 plan.only.join(",")
             )));
         }

@@ -118,6 +118,7 @@ fn search_subset(
     let mut which: Vec<usize> = groups.iter().flat_map(|g| g.iter().take(each).copied()).collect();
     which.sort_unstable();
     let part = PreparedRecordings {
+        zero_steps: which.iter().map(|r| prepared.zero_steps[*r].clone()).collect(),
         assumed: Arc::clone(&prepared.assumed),
         blocks: Arc::new(which.iter().map(|r| prepared.blocks[*r].clone()).collect()),
         drops: which.iter().map(|r| prepared.drops[*r].clone()).collect(),

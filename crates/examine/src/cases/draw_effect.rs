@@ -108,6 +108,14 @@ pub fn draw_effect(rng: &mut ChaCha8Rng, which: usize, case: &EffectContext) -> 
         "position_scale" => {
             Effect::PositionScale { eps: sign * by_size(rng, [(0.003, 0.01), (0.01, 0.04), (0.04, 0.08)]) }
         }
+        "zero_step" => Effect::ZeroStep { time_s: uniform(rng, 1.5, 15.0), step_n: 0.2 * sign },
+        "position_dependent_force" => Effect::PositionDependentForce {
+            stiffness_n_per_m: 3.0 * sign,
+            rest_m: case.tissue.surface_m - uniform(rng, 0.0, 0.02),
+        },
+        "loading_hysteresis" => {
+            Effect::LoadingHysteresis { fraction: 0.2, reversal_n: log_uniform(rng, 0.01, 0.2) }
+        }
         _ => Effect::ForceSpikes { rate_hz: uniform(rng, 0.2, 1.0), size_n: 1.0 },
     }
 }
@@ -186,6 +194,13 @@ pub fn scaled(effect: &Effect, factor: f64, largest_n: f64) -> Option<Effect> {
         }
         Quantisation { step_n } => Quantisation { step_n: to(step_n, 2e-3, 2.0) },
         ForceSpikes { rate_hz, size_n } => ForceSpikes { rate_hz, size_n: to(size_n, 0.05, 8.0) },
+        ZeroStep { time_s, step_n } => ZeroStep { time_s, step_n: to(step_n, 2e-3, 5.0) },
+        PositionDependentForce { stiffness_n_per_m, rest_m } => {
+            PositionDependentForce { stiffness_n_per_m: to(stiffness_n_per_m, 0.02, 60.0), rest_m }
+        }
+        LoadingHysteresis { fraction, reversal_n } => {
+            LoadingHysteresis { fraction: to(fraction, 0.003, 0.9), reversal_n }
+        }
         RateDependentPuncture { .. } | BoundaryShift { .. } | PositionScale { .. } | ForceGain { .. } => {
             return None;
         }

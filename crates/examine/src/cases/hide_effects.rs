@@ -23,19 +23,22 @@ fn fits(effect: &Effect, setup: &CaseSetup) -> bool {
 
 /// Whether two effects can be distinguished when both are present: they differ, and belong to different families.
 fn apart(a: &Effect, b: &Effect) -> bool {
-    const FAMILIES: [&[&str]; 3] = [
+    const FAMILIES: [&[&str]; 4] = [
         &["coulomb_friction", "stribeck_friction", "presliding_friction"],
         &["boundary_shift", "position_scale"],
         &["low_pass_lag", "time_delay"],
+        &["force_bias", "position_dependent_force"],
     ];
     a.id() != b.id() && !FAMILIES.iter().any(|f| f.contains(&a.id()) && f.contains(&b.id()))
 }
 
 /// Instrument faults.
-const INSTRUMENT: [&str; 8] = [
+const INSTRUMENT: [&str; 10] = [
     "force_gain",
     "force_bias",
     "force_drift",
+    "zero_step",
+    "position_dependent_force",
     "periodic_interference",
     "saturation",
     "quantisation",

@@ -32,10 +32,13 @@ pub enum Effect {
     Quantisation { step_n: f64 },
     PositionScale { eps: f64 },
     ForceSpikes { rate_hz: f64, size_n: f64 },
+    ZeroStep { time_s: f64, step_n: f64 },
+    PositionDependentForce { stiffness_n_per_m: f64, rest_m: f64 },
+    LoadingHysteresis { fraction: f64, reversal_n: f64 },
 }
 
 /// Their ids, in the order of docs/reference/model.md.
-pub const IDS: [&str; 27] = [
+pub const IDS: [&str; 30] = [
     "nonlinear_elasticity",
     "stress_relaxation",
     "coulomb_friction",
@@ -63,6 +66,9 @@ pub const IDS: [&str; 27] = [
     "quantisation",
     "position_scale",
     "force_spikes",
+    "zero_step",
+    "position_dependent_force",
+    "loading_hysteresis",
 ];
 
 /// Further ids that an answer may use: effects added for measured insertions.
@@ -105,6 +111,9 @@ impl Effect {
             Quantisation { .. } => 24,
             PositionScale { .. } => 25,
             ForceSpikes { .. } => 26,
+            ZeroStep { .. } => 27,
+            PositionDependentForce { .. } => 28,
+            LoadingHysteresis { .. } => 29,
         }
     }
 
@@ -155,6 +164,13 @@ impl Effect {
             }
             Saturation { limit_n } => vec![("limit_n", limit_n)],
             Quantisation { step_n } => vec![("step_n", step_n)],
+            ZeroStep { time_s, step_n } => vec![("time_s", time_s), ("step_n", step_n)],
+            PositionDependentForce { stiffness_n_per_m, rest_m } => {
+                vec![("stiffness_n_per_m", stiffness_n_per_m), ("rest_m", rest_m)]
+            }
+            LoadingHysteresis { fraction, reversal_n } => {
+                vec![("fraction", fraction), ("reversal_n", reversal_n)]
+            }
             ForceSpikes { rate_hz, size_n } => vec![("rate_hz", rate_hz), ("size_n", size_n)],
         };
         named.into_iter().map(|(path, value)| (path.to_owned(), value)).collect()

@@ -18,6 +18,10 @@ pub struct SensorModel {
     delay_s: f64,
     bias_n: f64,
     drift_n_per_s: f64,
+    /// Steps of the zero: time, size.
+    zero_steps: Vec<(f64, f64)>,
+    /// Forces linear in position: slope, position without force.
+    guides: Vec<(f64, f64)>,
     interference: Vec<(f64, f64, f64)>,
     limit_n: Option<f64>,
     steps_n: Vec<f64>,
@@ -38,6 +42,10 @@ impl SensorModel {
                 Effect::TimeDelay { delay_s } => it.delay_s += delay_s,
                 Effect::ForceBias { force_n } => it.bias_n += force_n,
                 Effect::ForceDrift { rate_n_per_s } => it.drift_n_per_s += rate_n_per_s,
+                Effect::ZeroStep { time_s, step_n } => it.zero_steps.push((time_s, step_n)),
+                Effect::PositionDependentForce { stiffness_n_per_m, rest_m } => {
+                    it.guides.push((stiffness_n_per_m, rest_m));
+                }
                 Effect::PeriodicInterference { amplitude_n, frequency_hz, phase_rad } => {
                     it.interference.push((amplitude_n, frequency_hz, phase_rad));
                 }
@@ -57,10 +65,11 @@ impl SensorModel {
         self
     }
 
-    /// Force between arm and sensor at base velocity `v` and acceleration `a`.
+    /// Force between arm and sensor at base position `z`, velocity `v` and acceleration `a`.
     #[must_use]
-    pub fn tool_n(&self, v: f64, a: f64) -> f64 {
-        self.mass_kg * a + self.drive_n * sgn(v)
+    pub fn tool_n(&self, z: f64, v: f64, a: f64) -> f64 {
+        let guides: f64 = self.guides.iter().map(|(slope, rest)| slope * (z - rest)).sum();
+        self.mass_kg * a + self.drive_n * sgn(v) + guides
     }
 
     /// The recorded position for a true one.
@@ -73,6 +82,7 @@ impl SensorModel {
     #[must_use]
     pub fn reading_n(&self, t: f64, force_n: f64, noise_n: f64) -> f64 {
         let mut f = force_n + self.bias_n + self.drift_n_per_s * t;
+        f += self.zero_steps.iter().filter(|s| t >= s.0).map(|s| s.1).sum::<f64>();
         for (amplitude, hz, phase) in &self.interference {
             f += amplitude * libm::sin(TAU * hz * t + phase);
         }

@@ -45,7 +45,7 @@ pub fn simulate_insertion(
     let mut extra =
         |p: &MotionState, ruptures: &[f64]| strange.as_mut().map_or(0.0, |s| s.force_n(p, ruptures));
     let first = law.start(&here);
-    let first = first + extra(&here, law.ruptures()) + instrument.tool_n(here.v, here.a);
+    let first = first + extra(&here, law.ruptures()) + instrument.tool_n(here.z, here.v, here.a);
     line.feed(ForceKnot { t: here.t, force_n: first });
     for &t in at_s {
         while here.t < t {
@@ -68,7 +68,7 @@ pub fn simulate_insertion(
                         v: here.v + (next.v - here.v) * s,
                         a: here.a + (next.a - here.a) * s,
                     };
-                    let force_n = knot.force_n + extra(&p, law.ruptures()) + instrument.tool_n(p.v, p.a);
+                    let force_n = knot.force_n + extra(&p, law.ruptures()) + instrument.tool_n(p.z, p.v, p.a);
                     line.feed(ForceKnot { t: knot.t, force_n });
                 }
                 here = next;
@@ -80,7 +80,7 @@ pub fn simulate_insertion(
                 law.jump(&here, &mut knots);
                 for knot in &knots {
                     let force_n =
-                        knot.force_n + extra(&here, law.ruptures()) + instrument.tool_n(here.v, here.a);
+                        knot.force_n + extra(&here, law.ruptures()) + instrument.tool_n(here.z, here.v, here.a);
                     line.feed(ForceKnot { t: knot.t, force_n });
                 }
             }

@@ -55,6 +55,8 @@ struct Departures {
     width: f64,
     breath: Option<(f64, f64, f64)>,
     spring: Option<f64>,
+    /// Share of the elastic force lost on unloading, and the change of force over which the branches switch.
+    hysteresis: Option<(f64, f64)>,
 }
 
 /// What the law remembers.
@@ -70,6 +72,10 @@ struct Memory {
     /// Elastic force before relaxation, its relaxed parts, and what is left.
     elastic: f64,
     relaxed: [f64; 2],
+    /// Distance from the loading branch: 0 on it, 2 on the unloading branch.
+    unloaded: f64,
+    /// Elastic force of the loading branch.
+    loading_n: f64,
     active_n: f64,
     /// Dahl's state.
     bristle: f64,
@@ -139,6 +145,9 @@ impl PlainWorld {
                 Effect::Respiration { amplitude_m, frequency_hz, phase_rad } => {
                     with.breath = Some((amplitude_m, core::f64::consts::TAU * frequency_hz, phase_rad));
                 }
+                Effect::LoadingHysteresis { fraction, reversal_n } => {
+                    with.hysteresis = Some((fraction, reversal_n));
+                }
                 Effect::NeedleCompliance { stiffness_n_per_m } => with.spring = Some(stiffness_n_per_m),
                 _ => {}
             }
@@ -189,6 +198,13 @@ impl PlainWorld {
         let from = self.now;
         let mut to = Memory { t: from.t + dt, z, v, deepest: from.deepest.max(z), ..from };
         to.elastic = self.elastic(z);
+        to.loading_n = to.elastic;
+        if let Some((fraction, reversal)) = self.with.hysteresis {
+            let change = to.loading_n - from.loading_n;
+            let keep = libm::exp(-change.abs() / reversal);
+            to.unloaded = from.unloaded * keep + if change < 0.0 { 2.0 * (1.0 - keep) } else { 0.0 };
+            to.elastic *= 1.0 - 0.5 * fraction * to.unloaded;
+        }
         to.active_n = to.elastic;
         if self.with.relaxes {
             if (dt - self.decay.0).abs() > 1e-9 * dt {
@@ -377,6 +393,7 @@ impl PlainWorld {
             self.ruptures.push(m.t);
             self.now.relaxed = [0.0; 2];
             self.now.elastic = self.elastic(m.z);
+            (self.now.unloaded, self.now.loading_n) = (0.0, self.now.elastic);
             self.now.active_n = self.now.elastic;
         }
         self.now.before = None;
@@ -392,6 +409,7 @@ impl ForceLaw for PlainWorld {
         let (z, v) = self.relative(at);
         self.now = Memory { t: at.t, z, v, base: z, base_v: v, deepest: z, ..Memory::default() };
         self.now.elastic = self.elastic(z);
+        self.now.loading_n = self.now.elastic;
         self.now.active_n = self.now.elastic;
         while self.gives_way(&self.now) {
             self.rupture();

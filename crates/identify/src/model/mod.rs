@@ -5,6 +5,7 @@
 //! | `assumptions`, `effect_term` | assumed tissue with tolerances; an effect with its parameter values |
 //! | `free_parameters`, `random_effects` | which parameters are free; parameters of recordings and days and their scatter |
 //! | `parameter`, `parameter_bounds`, `parameter_values` | what a parameter stands for; bounds and prior; its value |
+//! | `zero_steps` | steps of the sensor's zero in each recording |
 //! | `compiled_model` | law and measurement chain of one recording |
 
 mod assumptions;
@@ -15,6 +16,7 @@ mod parameter;
 mod parameter_bounds;
 mod parameter_values;
 mod random_effects;
+mod zero_steps;
 #[cfg(test)]
 mod tests;
 
@@ -26,6 +28,7 @@ pub use parameter::{Parameter, ParameterRole};
 pub use random_effects::{
     DayParameters, MAX_VARYING_PARAMETERS, RecordingParameters, Scatter, TiedParameter,
 };
+pub use zero_steps::ZeroStep;
 
 use std::sync::Arc;
 use stylet_tissue::Tissue;
@@ -50,6 +53,8 @@ pub struct Model {
     pub scatter: Scatter,
     /// Times (s) at which the recorded force shows the rupture of each layer, per recording.
     pub rupture_times_s: Vec<Vec<f64>>,
+    /// Steps of the sensor's zero, per recording in order of time; their sizes are fitted.
+    pub zero_steps: Vec<Vec<ZeroStep>>,
     /// Effect parameters that are not fitted by themselves.
     pub tied: Vec<TiedParameter>,
     /// Day of each recording; empty when days are not modelled.
@@ -75,6 +80,7 @@ impl Model {
             per_recording: vec![RecordingParameters::default(); recordings],
             scatter: Scatter::default(),
             rupture_times_s: vec![vec![NO_RUPTURE; layers]; recordings],
+            zero_steps: vec![Vec::new(); recordings],
             tied: Vec::new(),
             day_of: Vec::new(),
             days: Vec::new(),
@@ -90,6 +96,7 @@ impl Model {
         let mut model = self.clone();
         model.per_recording = which.iter().map(|r| self.per_recording[*r]).collect();
         model.rupture_times_s = which.iter().map(|r| self.rupture_times_s[*r].clone()).collect();
+        model.zero_steps = which.iter().map(|r| self.zero_steps[*r].clone()).collect();
         if !self.day_of.is_empty() {
             model.day_of = which.iter().map(|r| self.day_of[*r]).collect();
         }
@@ -139,9 +146,10 @@ impl Model {
         self.tissue.layers.len()
     }
 
-    /// Number of fitted parameters of all effects.
+    /// Number of fitted parameters of all effects, and of time and size of all steps of the zero.
     #[must_use]
     pub fn effect_parameter_count(&self) -> usize {
-        self.effects.iter().map(|e| e.info.parameters.iter().filter(|p| !p.integer).count()).sum()
+        let of_effect = |e: &EffectTerm| e.info.parameters.iter().filter(|p| !p.integer).count();
+        self.effects.iter().map(of_effect).sum::<usize>() + 2 * self.zero_step_count()
     }
 }

@@ -29,6 +29,8 @@ pub enum ParameterRole {
     DaySurface(usize),
     /// Log friction factor of a day.
     DayFriction(usize),
+    /// Size of a step of the sensor's zero (0-based) in each recording, in N.
+    ZeroStep(usize),
     /// Rupture time of a layer (0-based) in each recording, in s.
     RuptureTime(usize),
 }
@@ -42,6 +44,7 @@ impl ParameterRole {
             ParameterRole::RecordingSurface
                 | ParameterRole::RecordingFriction
                 | ParameterRole::RecordingEffect(_)
+                | ParameterRole::ZeroStep(_)
                 | ParameterRole::RuptureTime(_)
         )
     }

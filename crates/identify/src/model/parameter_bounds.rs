@@ -10,6 +10,9 @@ const MAX_TOLERANCES: f64 = 2.0;
 /// Bounds of thicknesses with [`FreeParameters::wide_thickness`](super::FreeParameters), in tolerances.
 const MAX_TOLERANCES_WIDE: f64 = 5.0;
 
+/// Finite difference in N for the size of a step of the zero, in which the force is linear.
+const ZERO_STEP_DIFFERENCE_N: f64 = 1e-3;
+
 impl Model {
     /// Whether a thickness deviates from the assumed value by more than its tolerance allows.
     #[must_use]
@@ -145,6 +148,7 @@ impl Model {
                 out.push(parameter(Role::RecordingEffect(k), self.varying_sd(k), step));
             }
         }
+        out.extend((0..self.most_zero_steps()).map(|k| parameter(Role::ZeroStep(k), infinity, ZERO_STEP_DIFFERENCE_N)));
         out.extend((0..self.layers()).map(|layer| parameter(Role::RuptureTime(layer), infinity, 1e-5)));
         out
     }

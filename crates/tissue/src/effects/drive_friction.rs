@@ -36,7 +36,7 @@ impl Effect for DriveFriction {
     fn is_inactive(&self) -> bool {
         self.force_n == 0.0
     }
-    fn tool_force(&self, v_mps: f64, _a_mps2: f64) -> f64 {
+    fn tool_force(&self, _z_m: f64, v_mps: f64, _a_mps2: f64) -> f64 {
         self.force_n * sgn(v_mps)
     }
 }

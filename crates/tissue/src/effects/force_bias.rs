@@ -20,8 +20,9 @@ static INFO: EffectInfo = EffectInfo {
     stage: ChainStage::Sensor,
     parameters: &[ParameterInfo::strength("force_n", "N", "offset")
         .allowed(-100.0, 100.0)
-        .search(0.05, -2.0, 2.0)],
+        .search(0.05, -100.0, 100.0)],
     proposal: Proposal::LinearColumns(&[&[&[0.1]]]),
+    baseline: true,
     ..EffectInfo::DEFAULTS
 };
 

@@ -21,8 +21,9 @@ static INFO: EffectInfo = EffectInfo {
     stage: ChainStage::Sensor,
     parameters: &[ParameterInfo::strength("rate_n_per_s", "N/s", "drift")
         .allowed(-10.0, 10.0)
-        .search(0.005, -0.1, 0.1)],
+        .search(0.005, -1.0, 1.0)],
     proposal: Proposal::LinearColumns(&[&[&[1e-3]]]),
+    baseline: true,
     ..EffectInfo::DEFAULTS
 };
 

@@ -28,10 +28,12 @@ mod hidden_membrane;
 mod incomplete_release;
 mod layer_coupling;
 mod layer_stiffening;
+mod loading_hysteresis;
 mod low_pass_lag;
 mod needle_compliance;
 mod nonlinear_elasticity;
 mod periodic_interference;
+mod position_dependent_force;
 mod position_scale;
 mod power_law_friction;
 mod presliding_friction;
@@ -47,6 +49,7 @@ mod stribeck_friction;
 mod time_delay;
 mod tool_inertia;
 mod viscoelastic_presliding;
+mod zero_step;
 
 /// Declares [`AnyEffect`], whose variants scenarios write in camel case, and passes every hook on to the variant.
 macro_rules! effects {
@@ -137,7 +140,7 @@ macro_rules! effects {
             fn layer_friction(tip: &TipState, slabs: &[Slab], sliding_mps: f64, state: &mut EffectState) -> f64;
             fn ruptures_membrane(z_m: f64, slabs: &[Slab], state: &mut EffectState) -> bool;
             fn tip_force(tip: &TipState, slabs: &[Slab], state: &mut EffectState) -> f64;
-            fn tool_force(v_mps: f64, a_mps2: f64) -> f64;
+            fn tool_force(z_m: f64, v_mps: f64, a_mps2: f64) -> f64;
             fn sensor_output(time_s: f64, dt_s: f64, force_n: f64, state: &mut EffectState) -> f64;
             fn mean_sensor_output(time_s: f64, span_s: f64, samples: f64, force_n: f64, state: &mut EffectState) -> f64;
             fn sensor_output_at_end(time_s: f64, span_s: f64, force_n: f64, state: &mut EffectState) -> f64;
@@ -179,6 +182,7 @@ effects! {
     respiration::Respiration,
     needle_compliance::NeedleCompliance,
     nonlinear_elasticity::NonlinearElasticity,
+    loading_hysteresis::LoadingHysteresis,
     stress_relaxation::StressRelaxation,
     rate_dependent_puncture::RateDependentPuncture,
     delayed_puncture::DelayedPuncture,
@@ -195,11 +199,13 @@ effects! {
     hidden_membrane::HiddenMembrane,
     tool_inertia::ToolInertia,
     drive_friction::DriveFriction,
+    position_dependent_force::PositionDependentForce,
     force_gain::ForceGain,
     low_pass_lag::LowPassLag,
     time_delay::TimeDelay,
     force_bias::ForceBias,
     force_drift::ForceDrift,
+    zero_step::ZeroStep,
     periodic_interference::PeriodicInterference,
     force_spikes::ForceSpikes,
     saturation::Saturation,

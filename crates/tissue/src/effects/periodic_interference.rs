@@ -32,7 +32,8 @@ static INFO: EffectInfo = EffectInfo {
             .allowed(0.0, 1e5)
             .inactive(5.0)
             .search(5.0, 0.05, 100.0)
-            .log(),
+            .log()
+            .clock(),
         ParameterInfo::shape("phase_rad", "rad", "phase at time zero").allowed(-100.0, 100.0).search(
             0.0,
             -core::f64::consts::PI,

@@ -33,7 +33,8 @@ static INFO: EffectInfo = EffectInfo {
             .allowed(0.0, 20.0)
             .inactive(0.25)
             .search(0.25, 0.05, 2.0)
-            .log(),
+            .log()
+            .clock(),
         ParameterInfo::shape("phase_rad", "rad", "phase at time zero").allowed(-100.0, 100.0).search(
             0.0,
             -core::f64::consts::PI,

@@ -36,7 +36,7 @@ impl Effect for ToolInertia {
     fn is_inactive(&self) -> bool {
         self.mass_kg == 0.0
     }
-    fn tool_force(&self, _v_mps: f64, a_mps2: f64) -> f64 {
+    fn tool_force(&self, _z_m: f64, _v_mps: f64, a_mps2: f64) -> f64 {
         self.mass_kg * a_mps2
     }
 }

@@ -1,0 +1,165 @@
+//! The sensor's baseline before anything else: an offset, a drift, a force linear in position, steps of the zero.
+//!
+//! These act in air too and may be larger than the tissue's force. A base law that is fitted without them assigns force
+//! drops to wrong layers and moves the surface, and a search that starts there does not return. Hence a second start: the
+//! base law with all of them, fitted from the prior, without those that do not pay for their parameters. The search runs
+//! from both starts, and the better model is kept.
+
+use crate::base_law_fit::{MISFIT_FACTOR, PreparedRecordings, fit_with_baseline};
+use crate::effect_selection::{Search, SearchStage};
+use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
+use crate::random_effect_selection::select_random_effects;
+use crate::zero_steps::{remove_weak_steps, zero_step_candidates};
+use rayon::prelude::*;
+use stylet_identify::fit::{Effort, Fit, fit};
+use stylet_identify::likelihood::FitData;
+use stylet_identify::model::EffectTerm;
+use stylet_identify::noise::NoiseSource;
+use stylet_identify::score_test::ScoreTest;
+use stylet_tissue::{EffectInfo, Proposal, general_effects};
+
+/// Force drops that may be steps of the zero instead of ruptures, tried one at a time.
+const MAX_ALTERNATIVES: usize = 6;
+
+/// The search from the base law, and from the base law with a baseline where that pays; the better of both with the
+/// recordings it was fitted to.
+pub(crate) fn search_with_baseline(
+    prepared: &PreparedRecordings,
+    base: Fit,
+    data: FitData,
+    progress: &mut impl FnMut(&str),
+) -> (Search, PreparedRecordings) {
+    progress("fitting the sensor's baseline");
+    let baseline = Baseline::fit(prepared, &base, &data);
+    let from_base = Search::run(prepared, base.clone(), data, progress);
+    let Some(baseline) = baseline else { return (from_base, prepared.clone()) };
+    let Baseline { prepared: with_steps, fit, data, stages } = baseline;
+    let start = Search { base, stages, ..Search::from_fit(fit, data) };
+    let mut from_baseline = Search::run_from(start, &with_steps, progress);
+    remove_weak_steps(&mut from_baseline);
+    let penalty = |s: &Search| bic_penalty(s.best.model.effect_parameter_count(), s.data.compared_block_count());
+    let needed = penalty(&from_baseline) - penalty(&from_base);
+    if likelihood_gain(&from_base.best, &from_baseline.best, &from_baseline.data).exceeds(needed) {
+        (from_baseline, with_steps)
+    } else {
+        (from_base, prepared.clone())
+    }
+}
+
+/// A fit of the base law with a baseline.
+struct Baseline {
+    prepared: PreparedRecordings,
+    fit: Fit,
+    data: FitData,
+    /// One step of the selection per effect.
+    stages: Vec<SearchStage>,
+}
+
+impl Baseline {
+    /// The baseline of the recordings; `None` when nothing of it pays.
+    fn fit(prepared: &PreparedRecordings, base: &Fit, data: &FitData) -> Option<Self> {
+        let infos: Vec<&'static EffectInfo> = general_effects().filter(|i| i.baseline).collect();
+        let candidates = zero_step_candidates(prepared, base);
+        if candidates.steps.iter().all(Vec::is_empty) && !may_pay(&infos, base, data) {
+            return None;
+        }
+        let inactive = |i: &&'static EffectInfo| {
+            EffectTerm::new(i, &i.parameters.iter().map(|p| p.inactive).collect::<Vec<f64>>())
+        };
+        let terms: Vec<EffectTerm> = infos.iter().map(inactive).collect();
+        let fitted = |steps: Vec<Vec<stylet_identify::model::ZeroStep>>| {
+            let prepared = prepared.with_zero_steps(steps);
+            let (fit, data) = fit_with_baseline(&prepared, &terms)?;
+            Some((prepared, fit, data))
+        };
+        let mut best = fitted(candidates.steps.clone())?;
+        // A drop that was assigned to a layer may be a step.
+        if !leaves_noise(&best.1, &best.2) {
+            let others: Vec<_> = candidates
+                .alternatives
+                .par_iter()
+                .take(MAX_ALTERNATIVES)
+                .filter_map(|(r, step)| {
+                    let mut steps = candidates.steps.clone();
+                    steps[*r].push(*step);
+                    steps[*r].sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+                    fitted(steps)
+                })
+                .collect();
+            for other in others {
+                let more = bic_penalty(2, other.2.compared_block_count()) + MIN_GAIN_NATS;
+                if likelihood_gain(&best.1, &other.1, &other.2).exceeds(more) {
+                    best = other;
+                }
+            }
+        }
+        let (prepared, fit, data) = best;
+        let (fit, data) = select_random_effects(fit, data);
+        let mut search = Search { base: base.clone(), ..Search::from_fit(fit, data) };
+        let stages = search.prune_baseline();
+        let prepared = prepared.with_zero_steps(search.best.model.zero_steps.clone());
+        let any = !search.best.model.effects.is_empty() || search.best.model.zero_step_count() > 0;
+        let needed = bic_penalty(search.best.model.effect_parameter_count(), search.data.compared_block_count());
+        (any && likelihood_gain(base, &search.best, &search.data).exceeds(needed + MIN_GAIN_NATS))
+            .then_some(Self { prepared, fit: search.best, data: search.data, stages })
+    }
+}
+
+/// Whether the first-order gain of some baseline effect pays for its parameters.
+fn may_pay(infos: &[&'static EffectInfo], base: &Fit, data: &FitData) -> bool {
+    let score_test = ScoreTest::new(base, data);
+    infos.par_iter().any(|info| {
+        let Proposal::LinearColumns(groups) = info.proposal else { return false };
+        let needed = bic_penalty(info.parameters.len(), data.compared_block_count()) + MIN_GAIN_NATS;
+        groups.iter().filter_map(|g| g.first()).any(|values| {
+            let column = score_test.effect_column(&EffectTerm::new(info, values));
+            column.is_some_and(|c| score_test.gain(&[c]).nats > needed)
+        })
+    })
+}
+
+fn leaves_noise(f: &Fit, data: &FitData) -> bool {
+    let calm = data.with_estimated_noise(&f.residuals.residual_n, NoiseSource::Detrended);
+    f.rms_n(data) < MISFIT_FACTOR * calm.noise.sd_n()
+}
+
+impl Search {
+    /// Removes baseline effects and steps whose loss is smaller than their penalty; returns one selection step per
+    /// remaining effect.
+    fn prune_baseline(&mut self) -> Vec<SearchStage> {
+        loop {
+            remove_weak_steps(self);
+            let blocks = self.data.compared_block_count();
+            let tried: Vec<(usize, Fit)> = (0..self.best.model.effects.len())
+                .into_par_iter()
+                .filter_map(|k| Some((k, fit(&self.best.model.without_effect(k), &self.data, Effort::FULL)?)))
+                .collect();
+            let count = |f: &Fit| f.model.effect_parameter_count();
+            let gains: Vec<(usize, f64, f64, Fit)> = tried
+                .into_par_iter()
+                .map(|(k, f)| {
+                    let needed = bic_penalty(count(&self.best) - count(&f), blocks) + MIN_GAIN_NATS;
+                    (k, likelihood_gain(&f, &self.best, &self.data).value(), needed, f)
+                })
+                .collect();
+            let weakest = gains.iter().min_by(|a, b| (a.1 - a.2).total_cmp(&(b.1 - b.2)));
+            match weakest {
+                Some((_, gain, needed, f)) if gain < needed => self.accept(f.clone()),
+                _ => return gains.iter().map(|g| self.baseline_stage(g.0, g.1, g.2)).collect(),
+            }
+        }
+    }
+
+    fn baseline_stage(&self, k: usize, gain: f64, required_nats: f64) -> SearchStage {
+        let term = &self.best.model.effects[k];
+        let parameters = term.info.parameters.iter().filter(|p| !p.integer).count();
+        SearchStage {
+            included: self.best.model.effects[..k].iter().map(|e| e.info.id).collect(),
+            candidates: vec![(term.info.id, gain, parameters)],
+            selected: Some((term.info.id, gain)),
+            required_nats,
+            choices: vec![term.clone()],
+        }
+    }
+}
+

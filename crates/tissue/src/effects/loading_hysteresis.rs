@@ -1,0 +1,74 @@
+use crate::chain_stage::ChainStage;
+use crate::effect::{Effect, EffectState};
+use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
+
+/// Rate-independent hysteresis of the elastic force: unloading runs below loading,
+/// `f_K -> f_K (1 - phi (1 - xi)/2)` with `xi' = (E'/F_r)(1 - xi sgn E')`, `E` the elastic force of the loading curve.
+///
+/// `xi` is 1 on first loading and goes to -1 once the force has fallen by a few `F_r`; it depends on the path of `E` alone,
+/// not on time. Integrated exactly in the change of `E` within a sample. A rupture restores `xi = 1`.
+///
+/// Inactive: `phi = 0`. Signature: after a reversal the elastic force follows a lower branch, the same at every speed; the
+/// first loading is unchanged. Source: Fung 1993 (pseudoelasticity of soft tissue); switching branches as in Dahl 1968.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct LoadingHysteresis {
+    /// Share `phi` of the elastic force that is lost on the unloading branch, 0 to 0.95. Inactive: 0.
+    pub fraction: f64,
+    /// Change `F_r` of the elastic force over which the branches switch, in N, 1e-5 to 100.
+    pub reversal_n: f64,
+}
+
+impl Default for LoadingHysteresis {
+    /// The inactive effect.
+    fn default() -> Self {
+        Self { fraction: 0.0, reversal_n: 0.05 }
+    }
+}
+
+static INFO: EffectInfo = EffectInfo {
+    id: "loading_hysteresis",
+    equation: "f_K -> f_K (1 - phi (1 - xi)/2), xi' = (E'/F_r)(1 - xi sgn E'), xi = 1 on first loading",
+    source: "Fung 1993, pseudoelasticity of soft tissue; Dahl 1968",
+    signature: "After each reversal the elastic force follows a lower branch, the same at every speed, and it stays there in holds.",
+    stage: ChainStage::Relaxation,
+    parameters: &[
+        ParameterInfo::strength("fraction", "", "share of the elastic force lost on unloading")
+            .allowed(0.0, 0.95)
+            .search(0.2, 0.01, 0.8),
+        ParameterInfo::shape("reversal_n", "N", "change of the elastic force over which the branches switch")
+            .allowed(1e-5, 100.0)
+            .inactive(0.05)
+            .search(0.05, 1e-3, 2.0)
+            .log(),
+    ],
+    proposal: Proposal::LinearColumns(&[&[&[0.05, 0.01]], &[&[0.05, 0.05]], &[&[0.05, 0.2]]]),
+    absorbs_unmodelled: true,
+    ..EffectInfo::DEFAULTS
+};
+
+described!(LoadingHysteresis { fraction, reversal_n });
+
+impl Effect for LoadingHysteresis {
+    fn info(&self) -> &'static EffectInfo {
+        &INFO
+    }
+    fn is_inactive(&self) -> bool {
+        self.fraction == 0.0
+    }
+    fn has_state(&self) -> bool {
+        true
+    }
+    /// State: `E` of the previous sample, `1 - xi`.
+    fn relax(&self, _dt_s: f64, elastic_n: f64, state: &mut EffectState) -> f64 {
+        let change = elastic_n - state[0];
+        // Distance from the branch of this direction: 0 on loading, 2 on unloading.
+        let branch = if change < 0.0 { 2.0 } else { 0.0 };
+        state[1] = branch + (state[1] - branch) * libm::exp(-change.abs() / self.reversal_n);
+        state[0] = elastic_n;
+        elastic_n * (1.0 - 0.5 * self.fraction * state[1])
+    }
+    fn on_rupture(&self, _released_n: f64, _z_m: f64, state: &mut EffectState) {
+        *state = [0.0; 8];
+    }
+}
