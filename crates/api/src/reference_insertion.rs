@@ -66,7 +66,14 @@ fn force(effects: &[AnyEffect]) -> Vec<f64> {
             let tissue_n = law.step(&mut state, t, z, v, |_| {}).total_n;
             chain.step(
                 &mut measuring,
-                &SensorInput { time_s: t, position_m: z, velocity_mps: v, acceleration_mps2: a, tissue_n, noise_n: 0.0 },
+                &SensorInput {
+                    time_s: t,
+                    position_m: z,
+                    velocity_mps: v,
+                    acceleration_mps2: a,
+                    tissue_n,
+                    noise_n: 0.0,
+                },
             )
         })
         .collect()

@@ -39,10 +39,15 @@ impl PreparedRecordings {
     /// The same recordings with these steps of the zero, which are no ruptures.
     #[must_use]
     pub fn with_zero_steps(&self, zero_steps: Vec<Vec<ZeroStep>>) -> Self {
-        let mut drops: Vec<Vec<ForceDrop>> = self.blocks.par_iter().map(detect_force_drops).collect();
-        for (drops, steps) in drops.iter_mut().zip(&zero_steps) {
+        let without_steps = |(b, steps): (&BlockAverages, &Vec<ZeroStep>)| {
+            let mut force_n = b.force_n.clone();
+            steps.iter().for_each(|s| s.add_to(&b.start_s, &b.end_s, &mut force_n, -1.0));
+            let b = BlockAverages::with_force(b, force_n);
+            let mut drops = detect_force_drops(&b);
             drops.retain(|d| steps.iter().all(|s| (s.time_s - d.time_s).abs() > SAME_EVENT_S));
-        }
+            drops
+        };
+        let drops = self.blocks.par_iter().zip(&zero_steps).map(without_steps).collect();
         Self { zero_steps, drops, ..self.clone() }
     }
 

@@ -9,17 +9,26 @@ use crate::base_law_fit::{MISFIT_FACTOR, PreparedRecordings, fit_with_baseline};
 use crate::effect_selection::{Search, SearchStage};
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use crate::random_effect_selection::select_random_effects;
-use crate::zero_steps::{remove_weak_steps, zero_step_candidates};
+use crate::zero_steps::{
+    remove_weak_steps, toggled, unassigned, with_steps_in_residual, zero_step_candidates,
+};
 use rayon::prelude::*;
+use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::likelihood::FitData;
-use stylet_identify::model::EffectTerm;
+use stylet_identify::model::{EffectTerm, ZeroStep};
 use stylet_identify::noise::NoiseSource;
 use stylet_identify::score_test::ScoreTest;
 use stylet_tissue::{EffectInfo, Proposal, general_effects};
 
+/// A baseline that reduces the residual by this factor, to the noise, is not put to question by other effects.
+const DOMINANT_FACTOR: f64 = 10.0;
+/// Rounds in which further steps are looked for in the residual.
+const RESIDUAL_ROUNDS: usize = 3;
 /// Force drops that may be steps of the zero instead of ruptures, tried one at a time.
-const MAX_ALTERNATIVES: usize = 6;
+const MAX_ALTERNATIVES: usize = 8;
+/// Rounds in which one of them changes its role.
+const MAX_EXCHANGES: usize = 4;
 
 /// The search from the base law, and from the base law with a baseline where that pays; the better of both with the
 /// recordings it was fitted to.
@@ -31,13 +40,21 @@ pub(crate) fn search_with_baseline(
 ) -> (Search, PreparedRecordings) {
     progress("fitting the sensor's baseline");
     let baseline = Baseline::fit(prepared, &base, &data);
-    let from_base = Search::run(prepared, base.clone(), data, progress);
-    let Some(baseline) = baseline else { return (from_base, prepared.clone()) };
-    let Baseline { prepared: with_steps, fit, data, stages } = baseline;
-    let start = Search { base, stages, ..Search::from_fit(fit, data) };
+    let Some(baseline) = baseline else {
+        return (Search::run(prepared, base, data, progress), prepared.clone());
+    };
+    let Baseline { prepared: with_steps, fit, data: data_of_baseline, stages } = baseline;
+    let dominant = base.rms_n(&data) > DOMINANT_FACTOR * fit.rms_n(&data_of_baseline)
+        && leaves_noise(&fit, &data_of_baseline);
+    let start = Search { base: base.clone(), stages, ..Search::from_fit(fit, data_of_baseline) };
     let mut from_baseline = Search::run_from(start, &with_steps, progress);
     remove_weak_steps(&mut from_baseline);
-    let penalty = |s: &Search| bic_penalty(s.best.model.effect_parameter_count(), s.data.compared_block_count());
+    if dominant {
+        return (from_baseline, with_steps);
+    }
+    let from_base = Search::run(prepared, base, data, progress);
+    let penalty =
+        |s: &Search| bic_penalty(s.best.model.effect_parameter_count(), s.data.compared_block_count());
     let needed = penalty(&from_baseline) - penalty(&from_base);
     if likelihood_gain(&from_base.best, &from_baseline.best, &from_baseline.data).exceeds(needed) {
         (from_baseline, with_steps)
@@ -59,39 +76,62 @@ impl Baseline {
     /// The baseline of the recordings; `None` when nothing of it pays.
     fn fit(prepared: &PreparedRecordings, base: &Fit, data: &FitData) -> Option<Self> {
         let infos: Vec<&'static EffectInfo> = general_effects().filter(|i| i.baseline).collect();
-        let candidates = zero_step_candidates(prepared, base);
-        if candidates.steps.iter().all(Vec::is_empty) && !may_pay(&infos, base, data) {
+        let candidates = zero_step_candidates(prepared);
+        let jumps_up = candidates.steps.iter().flatten().any(|s| s.size_n > 0.0);
+        if !jumps_up && unassigned(&candidates.drops, base).next().is_none() && !may_pay(&infos, base, data) {
             return None;
         }
         let inactive = |i: &&'static EffectInfo| {
             EffectTerm::new(i, &i.parameters.iter().map(|p| p.inactive).collect::<Vec<f64>>())
         };
         let terms: Vec<EffectTerm> = infos.iter().map(inactive).collect();
-        let fitted = |steps: Vec<Vec<stylet_identify::model::ZeroStep>>| {
+        let fitted = |steps: Vec<Vec<ZeroStep>>| {
             let prepared = prepared.with_zero_steps(steps);
             let (fit, data) = fit_with_baseline(&prepared, &terms)?;
             Some((prepared, fit, data))
         };
+        let gain_of = |other: &(PreparedRecordings, Fit, FitData),
+                       best: &(PreparedRecordings, Fit, FitData)| {
+            let count = |f: &Fit| f.model.effect_parameter_count() as f64;
+            let blocks = other.2.compared_block_count();
+            let penalty = (count(&other.1) - count(&best.1)) * bic_penalty(1, blocks);
+            likelihood_gain(&best.1, &other.1, &other.2).value() - penalty
+        };
+        // Drops that no layer takes are steps.
         let mut best = fitted(candidates.steps.clone())?;
-        // A drop that was assigned to a layer may be a step.
-        if !leaves_noise(&best.1, &best.2) {
+        let more = unassigned(&candidates.drops, &best.1);
+        let steps = more.fold(candidates.steps.clone(), |steps, drop| toggled(&steps, *drop));
+        if steps != candidates.steps
+            && let Some(other) = fitted(steps)
+            && gain_of(&other, &best) > MIN_GAIN_NATS
+        {
+            best = other;
+        }
+        // As long as more than noise is left, a drop may be a step instead of a rupture, or the reverse.
+        for _ in 0..candidates.drops.len().min(MAX_EXCHANGES) {
+            if leaves_noise(&best.1, &best.2) {
+                break;
+            }
             let others: Vec<_> = candidates
-                .alternatives
+                .drops
                 .par_iter()
                 .take(MAX_ALTERNATIVES)
-                .filter_map(|(r, step)| {
-                    let mut steps = candidates.steps.clone();
-                    steps[*r].push(*step);
-                    steps[*r].sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
-                    fitted(steps)
-                })
+                .filter_map(|drop| fitted(toggled(&best.0.zero_steps, *drop)))
+                .map(|other| (gain_of(&other, &best), other))
                 .collect();
-            for other in others {
-                let more = bic_penalty(2, other.2.compared_block_count()) + MIN_GAIN_NATS;
-                if likelihood_gain(&best.1, &other.1, &other.2).exceeds(more) {
-                    best = other;
-                }
+            match others.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+                Some((gain, other)) if gain > MIN_GAIN_NATS => best = other,
+                _ => break,
             }
+        }
+        for _ in 0..RESIDUAL_ROUNDS {
+            let (with_steps, fit, data) = &best;
+            let Some(steps) = with_steps_in_residual(&with_steps.zero_steps, fit, data) else { break };
+            let Some(other) = fitted(steps) else { break };
+            if gain_of(&other, &best) < MIN_GAIN_NATS {
+                break;
+            }
+            best = other;
         }
         let (prepared, fit, data) = best;
         let (fit, data) = select_random_effects(fit, data);
@@ -99,7 +139,8 @@ impl Baseline {
         let stages = search.prune_baseline();
         let prepared = prepared.with_zero_steps(search.best.model.zero_steps.clone());
         let any = !search.best.model.effects.is_empty() || search.best.model.zero_step_count() > 0;
-        let needed = bic_penalty(search.best.model.effect_parameter_count(), search.data.compared_block_count());
+        let needed =
+            bic_penalty(search.best.model.effect_parameter_count(), search.data.compared_block_count());
         (any && likelihood_gain(base, &search.best, &search.data).exceeds(needed + MIN_GAIN_NATS))
             .then_some(Self { prepared, fit: search.best, data: search.data, stages })
     }
@@ -108,6 +149,15 @@ impl Baseline {
 /// Whether the first-order gain of some baseline effect pays for its parameters.
 fn may_pay(infos: &[&'static EffectInfo], base: &Fit, data: &FitData) -> bool {
     let score_test = ScoreTest::new(base, data);
+    let offset_needed = bic_penalty(1, data.compared_block_count()) + MIN_GAIN_NATS;
+    let offset_pays = |recording: usize| {
+        let ones = |(r, b): (usize, &BlockAverages)| vec![f64::from(u8::from(r == recording)); b.len()];
+        let force: Vec<Vec<f64>> = data.recordings.iter().enumerate().map(ones).collect();
+        score_test.gain(&[score_test.force_column(&force)]).nats > offset_needed
+    };
+    if (0..data.recording_count()).any(offset_pays) {
+        return true;
+    }
     infos.par_iter().any(|info| {
         let Proposal::LinearColumns(groups) = info.proposal else { return false };
         let needed = bic_penalty(info.parameters.len(), data.compared_block_count()) + MIN_GAIN_NATS;
@@ -162,4 +212,3 @@ impl Search {
         }
     }
 }
-

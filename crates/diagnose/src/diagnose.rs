@@ -1,8 +1,8 @@
 //! Diagnosis of recordings: which effects the scenario lacks, with intervals, and the improvement on held-out
 //! recordings.
 
-use crate::baseline_search::search_with_baseline;
 use crate::base_law_fit::{PreparedRecordings, fit_base_law, refit_with_random_effects};
+use crate::baseline_search::search_with_baseline;
 use crate::competing_effects::{CompetingEffect, find_competing_effects};
 use crate::diagnosis_json::*;
 use crate::error::DiagnoseError;
@@ -13,12 +13,13 @@ use crate::identifiability::{advice, not_identifiable};
 use crate::input_checks::{
     CleanRecordings, NamedRecording, check_recordings, clean_recordings, force_outlier_notes,
 };
+use crate::motion_period::common_motion_period_s;
 use crate::negligible_effects::{Negligible, negligible_effects};
 use crate::random_effect_selection::select_random_effects;
 use crate::selection_state::{Search, SearchStage};
 use crate::sensor_artefact_causes::sensor_artefact_causes;
-use crate::zero_steps::{ZeroStepReport, zero_effects};
 use crate::verdict::{Assessment, assess_search, is_kept, move_negligible};
+use crate::zero_steps::{ZeroStepReport, zero_effects};
 use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
@@ -119,18 +120,18 @@ pub fn diagnose(
         (base, extended)
     };
     let noise_n = sample_noise_sd_n(&search.data);
+    let mut zeros = ZeroStepReport::new(&search);
     let mut negligible = Vec::new();
     if !options.brief {
         let small = negligible_effects(
             &search,
             &extended_held_out,
-            &assessment.causes,
+            &zeros.with_causes(&assessment.causes),
             &assessment.nats_against_zero,
         );
         negligible = move_negligible(&mut assessment, small);
     }
     let mut artefacts = sensor_artefact_causes(&raw, noise_n);
-    let steps = ZeroStepReport::new(&search);
     if assessment.unknown {
         let results = jackknife_effects(&search.best, &search.data, noise_n);
         let effects = search.best.model.effects.iter().zip(&results);
@@ -146,7 +147,10 @@ pub fn diagnose(
         negligible.extend(move_negligible(&mut assessment, dropped));
     }
     let mut causes = assessment.causes;
-    steps.add_to(&mut causes);
+    zeros.add_to(&mut causes);
+    for (notes, zero) in notes.iter_mut().zip(zeros.notes) {
+        notes.extend(zero);
+    }
     // Without an identified effect the base law is the final model.
     let extended_held_out =
         if has_cause(&search, &causes) { extended_held_out } else { base_held_out.clone() };
@@ -177,7 +181,7 @@ pub fn diagnose(
     }
     let diagnosis = Diagnosis {
         verdict,
-        advice: advice(&causes, &not_identifiable),
+        advice: advice(&causes, &not_identifiable, common_motion_period_s(&search.data)),
         base_parameters: assessment.base_parameters,
         not_identifiable,
         gain,

@@ -7,6 +7,7 @@ use crate::effect_start_values::effect_starts;
 use crate::geometry_selection::fix_geometry;
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use crate::model_pruning::{required_gain_nats, special_case_first};
+use crate::motion_period::has_confounded_clock;
 use crate::random_effect_selection::select_random_effects;
 use crate::reweighted_fit::fit_reweighted;
 use crate::selection_restarts::{MAX_BEHIND_SHARE, is_new_effect};
@@ -120,6 +121,7 @@ impl Search {
             full.extend(more);
             self.rank(&mut full);
         }
+        full.retain(|f| !has_confounded_clock(f, &self.data));
         if self.restart_from_leader(&full) {
             return self.add_effect(prepared);
         }

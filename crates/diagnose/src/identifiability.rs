@@ -1,6 +1,7 @@
 //! Identifiability: effects whose signature is absorbed by the fitted parameters, and motions that would reveal them.
 
 use crate::diagnosis_json::Cause;
+use crate::motion_period::common_motion_period_s;
 use rayon::prelude::*;
 use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::FitData;
@@ -22,6 +23,10 @@ pub fn not_identifiable(best: &Fit, data: &FitData) -> Vec<String> {
 }
 
 fn is_identifiable(info: &'static EffectInfo, score_test: &ScoreTest) -> bool {
+    // At a multiple of the commanded motion a clock shows nothing of its own.
+    if has_clock(info) && common_motion_period_s(score_test.data).is_some() {
+        return false;
+    }
     let typical = |group: &[&[f64]]| -> Vec<f64> {
         info.parameters
             .iter()
@@ -49,9 +54,13 @@ fn is_identifiable(info: &'static EffectInfo, score_test: &ScoreTest) -> bool {
     }
 }
 
+fn has_clock(info: &EffectInfo) -> bool {
+    info.parameters.iter().any(|p| p.clock)
+}
+
 /// Advice on motions that would separate equivalent effects or reveal hidden ones.
 #[must_use]
-pub fn advice(causes: &[Cause], not_identifiable: &[String]) -> Vec<String> {
+pub fn advice(causes: &[Cause], not_identifiable: &[String], motion_period_s: Option<f64>) -> Vec<String> {
     let mut advice = Vec::new();
     for cause in causes.iter().filter(|c| !c.equivalent.is_empty()) {
         advice.push(format!(
@@ -59,6 +68,12 @@ pub fn advice(causes: &[Cause], not_identifiable: &[String]) -> Vec<String> {
              retraction separates most of them.",
             cause.effect,
             cause.equivalent.join(", ")
+        ));
+    }
+    if let Some(period_s) = motion_period_s {
+        advice.push(format!(
+            "The motion of every recording is periodic ({period_s:.3} s): a cause with a clock of its own is not identifiable at its multiples. A \
+             hold of several periods inside the tissue, or a recording with another period, separates them."
         ));
     }
     let hidden = |place: ChainStage| {
@@ -96,18 +111,27 @@ mod tests {
             share: 0.0,
         };
         assert!(
-            advice(&[cause("force_bias", &[])], &["hidden_membrane".to_owned(), "no such effect".to_owned()])
-                .is_empty()
+            advice(
+                &[cause("force_bias", &[])],
+                &["hidden_membrane".to_owned(), "no such effect".to_owned()],
+                None
+            )
+            .is_empty()
         );
-        let one =
-            advice(&[cause("force_bias", &[]), cause("time_delay", &["low_pass_lag", "tool_inertia"])], &[]);
+        let one = advice(
+            &[cause("force_bias", &[]), cause("time_delay", &["low_pass_lag", "tool_inertia"])],
+            &[],
+            None,
+        );
         assert!(
             one.len() == 1 && one[0].starts_with("time_delay and low_pass_lag, tool_inertia explain"),
             "{one:?}"
         );
-        let friction = advice(&[], &["coulomb_friction".to_owned()]);
+        let friction = advice(&[], &["coulomb_friction".to_owned()], None);
         assert!(friction.len() == 1 && friction[0].starts_with("Friction effects"), "{friction:?}");
-        let sensor = advice(&[], &["hidden_membrane".to_owned(), "force_gain".to_owned()]);
+        let sensor = advice(&[], &["hidden_membrane".to_owned(), "force_gain".to_owned()], None);
+        let clock = advice(&[], &["respiration".to_owned()], Some(8.0));
+        assert!(clock.len() == 1 && clock[0].contains("(8.000 s)"), "{clock:?}");
         assert!(sensor.len() == 1 && sensor[0].starts_with("A wrong gain"), "{sensor:?}");
     }
 }

@@ -9,6 +9,7 @@
 //! | `baseline_search`, `zero_steps` | offset, drift, force linear in position, steps of the zero: before all other effects |
 //! | [`effect_start_values`], [`tone_detection`] | first-order gain and start values of every effect |
 //! | [`effect_selection`], [`model_comparison`] | forward selection by penalised gain, and pruning |
+//! | `motion_period` | causes with a clock that the commanded motion hides |
 //! | [`geometry_selection`] | fixed or free layer boundaries, position scale, shifted boundaries |
 //! | [`reweighted_fit`], [`varying_coefficient_test`] | robustness against unmodelled effects |
 //! | [`competing_effects`] | effects that explain the data equally well |
@@ -38,6 +39,7 @@ mod input_checks;
 mod local_minima;
 pub mod model_comparison;
 mod model_pruning;
+mod motion_period;
 pub mod negligible_effects;
 mod outlier_segment_test;
 pub mod prediction;

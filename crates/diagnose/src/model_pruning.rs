@@ -47,6 +47,7 @@ impl Search {
 
     /// Removes effects whose loss is smaller than their penalty.
     pub(crate) fn prune(&mut self) {
+        self.drop_confounded_clocks();
         loop {
             let n = self.best.model.effects.len();
             if n < 2 {

@@ -4,43 +4,93 @@ use crate::base_law_fit::{PreparedRecordings, SAME_EVENT_S};
 use crate::diagnosis_json::{Cause, Estimate};
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use crate::selection_state::Search;
-use std::collections::BTreeMap;
+use std::sync::Arc;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::{Effort, Fit, Linearization, fit};
 use stylet_identify::force_jumps::{ForceJump, detect_force_jumps};
 use stylet_identify::likelihood::{FitData, residuals};
 use stylet_identify::model::{ParameterRole, ZeroStep};
 use stylet_identify::noise::NoiseSource;
+use stylet_record::{QualityKind, QualityNote};
 use stylet_stats::Z95;
-use stylet_tissue::{AnyEffect, Effect};
+use stylet_tissue::{AnyEffect, Effect, ForceBias};
 
 /// A jump within this time (s) of a velocity jump may be friction.
 const VELOCITY_JUMP_S: f64 = 0.06;
 
 /// Candidates for steps.
 pub(crate) struct StepCandidates {
-    /// Jumps that no layer explains, per recording.
+    /// Steps at every jump up, and an offset of every recording but the first, per recording.
     pub steps: Vec<Vec<ZeroStep>>,
-    /// Drops that the base law assigned to a layer: recording and step, largest first.
-    pub alternatives: Vec<(usize, ZeroStep)>,
+    /// Drops, which may be ruptures or steps: recording and step, most significant first.
+    pub drops: Vec<(usize, ZeroStep)>,
 }
 
-/// Candidates in all recordings: every jump up, and drops where the base law ruptures no layer.
-pub(crate) fn zero_step_candidates(prepared: &PreparedRecordings, base: &Fit) -> StepCandidates {
-    let mut alternatives: Vec<(usize, ZeroStep)> = Vec::new();
-    let mut steps = Vec::new();
+/// Jumps of the force in all recordings, but for those at a velocity jump.
+pub(crate) fn zero_step_candidates(prepared: &PreparedRecordings) -> StepCandidates {
+    let mut drops: Vec<(f64, usize, ZeroStep)> = Vec::new();
+    let mut steps: Vec<Vec<ZeroStep>> = Vec::new();
     for (r, b) in prepared.blocks.iter().enumerate() {
-        let (of_layers, free): (Vec<ForceJump>, Vec<ForceJump>) =
-            detect_force_jumps(b).into_iter().filter(|j| !at_velocity_jump(b, j)).partition(|j| {
-                let near = |t: &f64| (t - j.time_s).abs() < SAME_EVENT_S;
-                j.size_n < 0.0 && base.model.rupture_times_s[r].iter().any(near)
-            });
-        let step = |j: ForceJump| ZeroStep { time_s: j.time_s, size_n: j.size_n };
-        alternatives.extend(of_layers.into_iter().map(|j| (r, step(j))));
-        steps.push(free.into_iter().map(step).collect());
+        // The sensor may be zeroed between two recordings: a step before the first sample.
+        let start = (r > 0).then(|| ZeroStep { time_s: b.span_s().0, size_n: 0.0 });
+        let mut own: Vec<ZeroStep> = start.into_iter().collect();
+        for j in detect_force_jumps(b).into_iter().filter(|j| !at_velocity_jump(b, j)) {
+            let step = ZeroStep { time_s: j.time_s, size_n: j.size_n };
+            if j.size_n > 0.0 {
+                own.push(step);
+            } else {
+                drops.push((j.score, r, step));
+            }
+        }
+        steps.push(own);
     }
-    alternatives.sort_by(|a, b| a.1.size_n.total_cmp(&b.1.size_n));
-    StepCandidates { steps, alternatives }
+    drops.sort_by(|a, b| b.0.total_cmp(&a.0));
+    StepCandidates { steps, drops: drops.into_iter().map(|(_, r, step)| (r, step)).collect() }
+}
+
+/// The drops that are no rupture of a fit.
+pub(crate) fn unassigned<'a>(
+    drops: &'a [(usize, ZeroStep)],
+    f: &'a Fit,
+) -> impl Iterator<Item = &'a (usize, ZeroStep)> {
+    drops
+        .iter()
+        .filter(|(r, s)| f.model.rupture_times_s[*r].iter().all(|t| (t - s.time_s).abs() > SAME_EVENT_S))
+}
+
+/// Adds a step to a list, or removes it from there.
+pub(crate) fn toggled(steps: &[Vec<ZeroStep>], (r, step): (usize, ZeroStep)) -> Vec<Vec<ZeroStep>> {
+    let mut steps = steps.to_vec();
+    let count = steps[r].len();
+    steps[r].retain(|s| s.time_s != step.time_s);
+    if steps[r].len() == count {
+        steps[r].push(step);
+        steps[r].sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    }
+    steps
+}
+
+/// The steps with further ones at the jumps of a fit's residual; `None` when there are none.
+pub(crate) fn with_steps_in_residual(
+    steps: &[Vec<ZeroStep>],
+    f: &Fit,
+    data: &FitData,
+) -> Option<Vec<Vec<ZeroStep>>> {
+    let mut all = steps.to_vec();
+    for (r, b) in data.recordings.iter().enumerate() {
+        let e = &f.residuals.residual_n[r];
+        let samples = Arc::new(b.sample_residuals(e));
+        let mut residual = b.clone();
+        (residual.force_n, residual.sample_force_n) = (e.clone(), samples);
+        let known = |j: &ForceJump| {
+            let near = |t: f64| (t - j.time_s).abs() < SAME_EVENT_S;
+            steps[r].iter().any(|s| near(s.time_s)) || f.model.rupture_times_s[r].iter().any(|t| near(*t))
+        };
+        let new = detect_force_jumps(&residual).into_iter().filter(|j| !known(j) && !at_velocity_jump(b, j));
+        all[r].extend(new.map(|j| ZeroStep { time_s: j.time_s, size_n: j.size_n }));
+        all[r].sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    }
+    (all != steps).then_some(all)
 }
 
 fn at_velocity_jump(b: &BlockAverages, j: &ForceJump) -> bool {
@@ -52,17 +102,15 @@ fn step_sds(f: &Fit, data: &FitData) -> Vec<Vec<f64>> {
     let t = Linearization::new(&f.model, data, &f.residuals);
     let variances = t.factor().inverse_diagonal();
     let place = |k: usize| t.per_recording.iter().position(|n| n.role == ParameterRole::ZeroStep(k));
-    let sd = |r: usize, k: usize| {
-        place(k).map_or(f64::INFINITY, |o| variances[t.index_of(o, r)].max(0.0).sqrt())
-    };
+    let sd =
+        |r: usize, k: usize| place(k).map_or(f64::INFINITY, |o| variances[t.index_of(o, r)].max(0.0).sqrt());
     f.model.zero_steps.iter().enumerate().map(|(r, s)| (0..s.len()).map(|k| sd(r, k)).collect()).collect()
 }
 
 /// Removes the least significant step as long as it does not pay for its two parameters.
 pub(crate) fn remove_weak_steps(search: &mut Search) {
     while search.best.model.zero_step_count() > 0 {
-        let data =
-            search.data.with_estimated_noise(&search.best.residuals.residual_n, NoiseSource::Residual);
+        let data = search.data.with_estimated_noise(&search.best.residuals.residual_n, NoiseSource::Residual);
         let Some(at) = residuals(&search.best.model, &data) else { return };
         let f = Fit { model: search.best.model.clone(), residuals: at };
         let nats = |s: &ZeroStep, sd: f64| 0.5 * (s.size_n / sd).powi(2);
@@ -81,12 +129,16 @@ pub(crate) fn remove_weak_steps(search: &mut Search) {
     }
 }
 
-/// The steps of the zero as the diagnosis reports them.
+/// The zero of the sensor as the diagnosis reports it.
 pub(crate) struct ZeroStepReport {
     /// One cause for all steps, with time and size of the largest.
-    cause: Option<Cause>,
-    /// The offset before the first step belongs to the steps: the zero is right between two of them, or at the end.
+    steps: Option<Cause>,
+    /// The largest offset, where the offset differs between recordings.
+    offset: Option<Cause>,
+    /// The offset before the first step belongs to the steps: the zero is right after one of them.
     holds_offset: bool,
+    /// A note on every recording with steps or an offset of its own.
+    pub notes: Vec<Option<QualityNote>>,
 }
 
 impl ZeroStepReport {
@@ -94,20 +146,103 @@ impl ZeroStepReport {
     pub(crate) fn new(search: &Search) -> Self {
         let data =
             search.data.with_estimated_noise(&search.best.residuals.residual_n, NoiseSource::LongMemory);
-        let sds = step_sds(&search.best, &data);
-        Self { cause: zero_step_cause(search, &sds), holds_offset: holds_offset(search, &sds) }
+        let zeros = recorded_zeros(search, &step_sds(&search.best, &data));
+        let noise_n = search.data.noise.sd_n();
+        let right = |level_n: f64, sd_n: f64| level_n.abs() < Z95 * noise_n.hypot(sd_n);
+        let is_right_later = |z: &RecordedZero| {
+            let (mut level, mut sd) = z.offset_n;
+            z.steps.iter().any(|(s, step_sd)| {
+                (level, sd) = (level + s.size_n, sd.hypot(*step_sd));
+                right(level, sd)
+            })
+        };
+        let with_steps = || zeros.iter().filter(|z| !z.steps.is_empty());
+        Self {
+            steps: steps_cause(search, &zeros),
+            offset: offset_cause(search, &zeros),
+            holds_offset: with_steps().next().is_some() && with_steps().all(is_right_later),
+            notes: zeros.iter().map(RecordedZero::note).collect(),
+        }
     }
 
-    /// Adds the cause; the offset before the steps is no cause of its own.
-    pub(crate) fn add_to(self, causes: &mut Vec<Cause>) {
-        if self.holds_offset {
-            causes.retain(|c| c.effect != stylet_tissue::ForceBias::ID);
+    /// The causes together with those of the steps.
+    pub(crate) fn with_causes(&self, causes: &[Cause]) -> Vec<Cause> {
+        causes.iter().chain(&self.offset).chain(&self.steps).cloned().collect()
+    }
+
+    /// Adds the causes; an offset before steps to the right zero is no cause of its own.
+    pub(crate) fn add_to(&mut self, causes: &mut Vec<Cause>) {
+        if self.offset.is_some() || self.holds_offset {
+            causes.retain(|c| c.effect != ForceBias::ID);
         }
-        causes.extend(self.cause);
+        causes.extend(self.offset.take().filter(|_| !self.holds_offset));
+        causes.extend(self.steps.take());
     }
 }
 
-/// Offset of the model in N; zero without one.
+/// The zero of one recording.
+struct RecordedZero {
+    /// Offset at the start with its standard deviation relative to the first recording.
+    offset_n: (f64, f64),
+    /// Whether the offset differs from that of the first recording.
+    differs: bool,
+    /// Steps with the standard deviations of their sizes.
+    steps: Vec<(ZeroStep, f64)>,
+    /// Half the sampling interval in s.
+    half_step_s: f64,
+}
+
+impl RecordedZero {
+    fn largest(&self) -> Option<&(ZeroStep, f64)> {
+        self.steps.iter().max_by(|a, b| a.0.size_n.abs().total_cmp(&b.0.size_n.abs()))
+    }
+
+    fn note(&self) -> Option<QualityNote> {
+        let offset_n = self.offset_n.0;
+        let mut numbers = vec![("offset_n", offset_n), ("count", self.steps.len() as f64)];
+        let message = if let Some((s, _)) = self.largest() {
+            numbers.extend([("largest_n", s.size_n), ("at_s", s.time_s)]);
+            format!(
+                "the zero of the force sensor steps {} time(s), most by {:.3} N at {:.3} s; before the first step it is off by {offset_n:.3} N",
+                self.steps.len(),
+                s.size_n,
+                s.time_s
+            )
+        } else if self.differs {
+            format!(
+                "the zero of the force sensor is off by {offset_n:.3} N, another value than in the first recording"
+            )
+        } else {
+            return None;
+        };
+        Some(QualityNote {
+            kind: QualityKind::ZeroStep,
+            message,
+            numbers: numbers.into_iter().map(|(name, x)| (name.to_owned(), x)).collect(),
+            lines: Vec::new(),
+            blocking: false,
+        })
+    }
+}
+
+fn recorded_zeros(search: &Search, sds: &[Vec<f64>]) -> Vec<RecordedZero> {
+    let common_n = offset_n(search);
+    let one = |((b, steps), sds): ((&BlockAverages, &Vec<ZeroStep>), &Vec<f64>)| {
+        let all = steps.iter().copied().zip(sds.iter().copied());
+        let (at_start, later): (Vec<(ZeroStep, f64)>, Vec<_>) =
+            all.partition(|(s, _)| s.time_s <= b.span_s().0);
+        let own = at_start.first().map_or((0.0, 0.0), |(s, sd)| (s.size_n, *sd));
+        RecordedZero {
+            offset_n: (common_n + own.0, own.1),
+            differs: !at_start.is_empty(),
+            steps: later,
+            half_step_s: 0.5 * b.sample_step_s,
+        }
+    };
+    search.data.recordings.iter().zip(&search.best.model.zero_steps).zip(sds).map(one).collect()
+}
+
+/// Offset of the model in N that all recordings share; zero without one.
 fn offset_n(search: &Search) -> f64 {
     let bias = search.best.model.effects.iter().filter_map(|e| match e.effect()? {
         AnyEffect::ForceBias(bias) => Some(bias.force_n),
@@ -116,64 +251,55 @@ fn offset_n(search: &Search) -> f64 {
     bias.sum()
 }
 
-/// Whether the zero is right, to within the error of the steps and the noise, after one of the steps.
-fn holds_offset(search: &Search, sds: &[Vec<f64>]) -> bool {
-    let noise_n = search.data.noise.sd_n();
-    let of_recording = |(steps, sds): (&Vec<ZeroStep>, &Vec<f64>)| {
-        let (mut level, mut variance) = (offset_n(search), noise_n * noise_n);
-        steps.iter().zip(sds).any(|(s, sd)| {
-            level += s.size_n;
-            variance += sd * sd;
-            level.abs() < Z95 * variance.sqrt()
-        })
-    };
-    search.best.model.zero_steps.iter().zip(sds).any(of_recording)
-}
-
-/// The steps of a single recording as effects of the extended scenario, with the offset that belongs to them. Those of several
-/// recordings are at different times, and no property of the next insertion.
+/// The steps of a single recording as effects of the extended scenario, with the offset that belongs to them. Those of
+/// several recordings are at different times, and no property of the next insertion.
 pub(crate) fn zero_effects(search: &Search, causes: &[Cause]) -> Vec<AnyEffect> {
-    let model = &search.best.model;
-    let [steps] = &model.zero_steps[..] else { return Vec::new() };
-    let mut effects: Vec<AnyEffect> = Vec::new();
+    let [steps] = &search.best.model.zero_steps[..] else { return Vec::new() };
     let offset = offset_n(search);
-    if !steps.is_empty() && offset != 0.0 && causes.iter().all(|c| c.effect != stylet_tissue::ForceBias::ID) {
-        effects.push(stylet_tissue::ForceBias { force_n: offset }.into());
-    }
+    let folded = !steps.is_empty() && offset != 0.0 && causes.iter().all(|c| c.effect != ForceBias::ID);
+    let bias = folded.then(|| ForceBias { force_n: offset }.into());
     let step = |s: &ZeroStep| stylet_tissue::ZeroStep { time_s: s.time_s, step_n: s.size_n }.into();
-    effects.extend(steps.iter().map(step));
-    effects
+    bias.into_iter().chain(steps.iter().map(step)).collect()
 }
 
-/// The steps as one cause; `sds` are the standard deviations of their sizes. `None` without steps.
-fn zero_step_cause(search: &Search, sds: &[Vec<f64>]) -> Option<Cause> {
+/// The steps as one cause; `None` without steps.
+fn steps_cause(search: &Search, zeros: &[RecordedZero]) -> Option<Cause> {
+    let largest = zeros.iter().filter_map(|z| Some((z.half_step_s, z.largest()?)));
+    let (half_s, (s, sd)) = largest.max_by(|a, b| a.1.0.size_n.abs().total_cmp(&b.1.0.size_n.abs()))?;
+    let effect = stylet_tissue::ZeroStep { time_s: s.time_s, step_n: s.size_n }.into();
+    Some(cause(search, &effect, &[half_s, Z95 * sd], |at_start| !at_start))
+}
+
+/// The largest offset as a cause, where the offset differs between recordings.
+fn offset_cause(search: &Search, zeros: &[RecordedZero]) -> Option<Cause> {
+    zeros.iter().find(|z| z.differs)?;
+    let largest = zeros.iter().max_by(|a, b| a.offset_n.0.abs().total_cmp(&b.offset_n.0.abs()))?;
+    let (force_n, sd_n) = largest.offset_n;
+    Some(cause(search, &ForceBias { force_n }.into(), &[Z95 * sd_n], |at_start| at_start))
+}
+
+/// A cause with these half widths; its gain is the loss without the steps that `removed` selects by whether they are before the
+/// first sample.
+fn cause(search: &Search, effect: &AnyEffect, half_widths: &[f64], removed: impl Fn(bool) -> bool) -> Cause {
     let (model, data) = (&search.best.model, &search.data);
-    let all = model.zero_steps.iter().enumerate().flat_map(|(r, s)| s.iter().enumerate().map(move |(k, s)| (r, k, s)));
-    let (r, k, largest) = all.max_by(|a, b| a.2.size_n.abs().total_cmp(&b.2.size_n.abs()))?;
     let mut without = model.clone();
-    without.zero_steps.iter_mut().for_each(Vec::clear);
-    let gain_nats = fit(&without, &search.data, Effort::FULL)
-        .map_or(0.0, |f| likelihood_gain(&f, &search.best, &search.data).value());
-    let needed = bic_penalty(2 * model.zero_step_count(), data.compared_block_count()) + MIN_GAIN_NATS;
-    let half_s = 0.5 * search.data.recordings[r].sample_step_s;
-    let half_n = Z95 * sds[r][k];
-    let effect = stylet_tissue::ZeroStep { time_s: largest.time_s, step_n: largest.size_n };
-    let effect = AnyEffect::from(effect);
-    let intervals = [half_s, half_n];
-    let parameters: BTreeMap<String, Estimate> = effect
-        .info()
-        .parameters
-        .iter()
-        .zip(effect.parameters())
-        .zip(intervals)
-        .map(|((p, value), half)| (p.path.to_owned(), Estimate { value, low: value - half, high: value + half }))
-        .collect();
-    Some(Cause {
+    for (steps, b) in without.zero_steps.iter_mut().zip(data.recordings.iter()) {
+        steps.retain(|s| !removed(s.time_s <= b.span_s().0));
+    }
+    let gain_nats =
+        fit(&without, data, Effort::FULL).map_or(0.0, |f| likelihood_gain(&f, &search.best, data).value());
+    let count = model.zero_step_count() - without.zero_step_count();
+    let needed = bic_penalty(2 * count, data.compared_block_count()) + MIN_GAIN_NATS;
+    let parameters = effect.info().parameters.iter().zip(effect.parameters()).zip(half_widths);
+    let estimate = |value: f64, half: f64| Estimate { value, low: value - half, high: value + half };
+    Cause {
         effect: effect.id().to_owned(),
         equivalent: Vec::new(),
         confidence: 1.0 / (1.0 + libm::exp(-(gain_nats - needed).clamp(-30.0, 30.0) - 3.0)),
-        parameters,
+        parameters: parameters
+            .map(|((p, value), half)| (p.path.to_owned(), estimate(value, *half)))
+            .collect(),
         gain_nats,
         share: 0.0,
-    })
+    }
 }

@@ -243,8 +243,14 @@ impl Case {
                     };
                     noise_n += spike * spike_n;
                 }
-                let reading =
-                    SensorInput { time_s: t, position_m: z, velocity_mps: v, acceleration_mps2: a, tissue_n, noise_n };
+                let reading = SensorInput {
+                    time_s: t,
+                    position_m: z,
+                    velocity_mps: v,
+                    acceleration_mps2: a,
+                    tissue_n,
+                    noise_n,
+                };
                 let f = chain.step(&mut measuring, &reading);
                 if sampled {
                     columns.iter_mut().zip([t, chain.recorded_position(z), f]).for_each(|(c, x)| c.push(x));

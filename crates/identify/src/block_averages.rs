@@ -356,6 +356,12 @@ impl BlockAverages {
         self.motion.pieces(spans, appearance, |t| self.sample_midpoint_s(t))
     }
 
+    /// The same blocks with other mean forces (N).
+    #[must_use]
+    pub fn with_force(&self, force_n: Vec<f64>) -> Self {
+        Self { force_n, ..self.clone() }
+    }
+
     /// Residuals (N) of the samples for block residuals `e`: the block residual plus the sample's deviation
     /// from the course of the block means.
     #[must_use]

@@ -24,8 +24,7 @@ pub struct ForceJump {
 /// Jumps of a recording, in order of time.
 #[must_use]
 pub fn detect_force_jumps(b: &BlockAverages) -> Vec<ForceJump> {
-    let mut negated = b.clone();
-    negated.force_n.iter_mut().for_each(|f| *f = -*f);
+    let negated = b.with_force(b.force_n.iter().map(|f| -f).collect());
     let of = |drops: Vec<ForceDrop>, sign: f64| {
         drops.into_iter().filter_map(move |d| localised(b, &d, sign)).collect::<Vec<ForceJump>>()
     };
@@ -40,7 +39,8 @@ fn localised(b: &BlockAverages, drop: &ForceDrop, sign: f64) -> Option<ForceJump
     let (time, force) = (&b.sample_time_s, &b.sample_force_n);
     let reach_s = (SEARCH_BLOCKS as f64 + 0.5) * b.samples_per_block as f64 * b.sample_step_s;
     let from = time.partition_point(|t| *t < drop.time_s - reach_s).max(LOCAL_SAMPLES);
-    let to = time.partition_point(|t| *t <= drop.time_s + reach_s).min(time.len().checked_sub(LOCAL_SAMPLES)?);
+    let to =
+        time.partition_point(|t| *t <= drop.time_s + reach_s).min(time.len().checked_sub(LOCAL_SAMPLES)?);
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
     let jump = |i: usize| sign * (mean(&force[i..i + LOCAL_SAMPLES]) - mean(&force[i - LOCAL_SAMPLES..i]));
     let at = (from..to).max_by(|a, b| jump(*a).total_cmp(&jump(*b)))?;

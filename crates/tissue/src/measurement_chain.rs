@@ -165,7 +165,8 @@ impl MeasurementChain {
     pub fn mean_force(&self, state: &mut MeasurementState, interval: &AveragingInterval) -> f64 {
         let mut force = interval.tissue_n;
         for effect in &self.tool {
-            force += effect.tool_force(interval.position_m, interval.velocity_mps, interval.acceleration_mps2);
+            force +=
+                effect.tool_force(interval.position_m, interval.velocity_mps, interval.acceleration_mps2);
         }
         for (effect, state_of_effect) in self.before_delay.iter().zip(&mut state.effects) {
             force = effect.mean_sensor_output(
@@ -194,7 +195,8 @@ impl MeasurementChain {
     pub fn force_at_end(&self, state: &mut MeasurementState, interval: &AveragingInterval) -> f64 {
         let mut force = interval.tissue_n;
         for effect in &self.tool {
-            force += effect.tool_force(interval.position_m, interval.velocity_mps, interval.acceleration_mps2);
+            force +=
+                effect.tool_force(interval.position_m, interval.velocity_mps, interval.acceleration_mps2);
         }
         for (effect, state_of_effect) in self.before_delay.iter().zip(&mut state.effects) {
             force = effect.sensor_output_at_end(interval.time_s, interval.span_s, force, state_of_effect);

@@ -116,8 +116,14 @@ fn library(effect: Option<&Effect>) -> Vec<f64> {
         }
         let p = path.at(piece, time_s);
         let tissue_n = law.step(&mut state, time_s, p.z, p.v, |_| {}).total_n;
-        let reading =
-            SensorInput { time_s, position_m: p.z, velocity_mps: p.v, acceleration_mps2: p.a, tissue_n, noise_n: 0.0 };
+        let reading = SensorInput {
+            time_s,
+            position_m: p.z,
+            velocity_mps: p.v,
+            acceleration_mps2: p.a,
+            tissue_n,
+            noise_n: 0.0,
+        };
         let force = chain.step(&mut measuring, &reading);
         if k % 50 == 0 {
             out.push(force);

@@ -52,7 +52,9 @@ fn steps_of_the_zero_add_up_and_count_in_a_mean_by_the_time_after_them() {
     let mean = |time_s, state: &mut _| {
         chain.mean_force(state, &AveragingInterval { time_s, span_s: 0.02, ..AveragingInterval::default() })
     };
-    for (time_s, expected) in [(0.9, 0.0), (0.995, 0.075), (1.0, 0.15), (1.5, 0.3), (2.005, -0.075), (3.0, -0.2)] {
+    for (time_s, expected) in
+        [(0.9, 0.0), (0.995, 0.075), (1.0, 0.15), (1.5, 0.3), (2.005, -0.075), (3.0, -0.2)]
+    {
         near(mean(time_s, &mut state), expected, 1e-12);
     }
 }
@@ -196,7 +198,14 @@ fn the_mean_over_intervals_is_that_of_many_samples() {
             let time_s = span_s * (f64::from(k) + (f64::from(i) + 0.5) / f64::from(readings));
             sum += chain.step(
                 &mut fine,
-                &SensorInput { time_s, position_m: 0.0, velocity_mps: 0.01, acceleration_mps2, tissue_n, noise_n: 0.0 },
+                &SensorInput {
+                    time_s,
+                    position_m: 0.0,
+                    velocity_mps: 0.01,
+                    acceleration_mps2,
+                    tissue_n,
+                    noise_n: 0.0,
+                },
             );
         }
         let cell = AveragingInterval {

@@ -79,8 +79,9 @@ pub fn simulate_insertion(
                 knots.clear();
                 law.jump(&here, &mut knots);
                 for knot in &knots {
-                    let force_n =
-                        knot.force_n + extra(&here, law.ruptures()) + instrument.tool_n(here.z, here.v, here.a);
+                    let force_n = knot.force_n
+                        + extra(&here, law.ruptures())
+                        + instrument.tool_n(here.z, here.v, here.a);
                     line.feed(ForceKnot { t: knot.t, force_n });
                 }
             }

@@ -16,9 +16,9 @@ mod parameter;
 mod parameter_bounds;
 mod parameter_values;
 mod random_effects;
-mod zero_steps;
 #[cfg(test)]
 mod tests;
+mod zero_steps;
 
 pub use assumptions::Assumptions;
 pub use compiled_model::CompiledModel;

@@ -148,7 +148,10 @@ impl Model {
                 out.push(parameter(Role::RecordingEffect(k), self.varying_sd(k), step));
             }
         }
-        out.extend((0..self.most_zero_steps()).map(|k| parameter(Role::ZeroStep(k), infinity, ZERO_STEP_DIFFERENCE_N)));
+        out.extend(
+            (0..self.most_zero_steps())
+                .map(|k| parameter(Role::ZeroStep(k), infinity, ZERO_STEP_DIFFERENCE_N)),
+        );
         out.extend((0..self.layers()).map(|layer| parameter(Role::RuptureTime(layer), infinity, 1e-5)));
         out
     }

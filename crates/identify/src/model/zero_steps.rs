@@ -12,16 +12,22 @@ pub struct ZeroStep {
     pub size_n: f64,
 }
 
+impl ZeroStep {
+    /// Adds `factor` times the step to the means `force_n` of blocks with these limits.
+    pub fn add_to(&self, start_s: &[f64], end_s: &[f64], force_n: &mut [f64], factor: f64) {
+        let first = end_s.partition_point(|end| *end <= self.time_s);
+        for (k, force) in force_n.iter_mut().enumerate().skip(first) {
+            let after = ((end_s[k] - self.time_s) / (end_s[k] - start_s[k])).clamp(0.0, 1.0);
+            *force += factor * self.size_n * after;
+        }
+    }
+}
+
 impl Model {
     /// Adds the steps of recording `r` to the predicted block means `force_n`.
     pub fn add_zero_steps(&self, r: usize, blocks: &BlockAverages, force_n: &mut [f64]) {
         for step in self.zero_steps.get(r).into_iter().flatten() {
-            let first = blocks.end_s.partition_point(|end| *end <= step.time_s);
-            for (k, force) in force_n.iter_mut().enumerate().skip(first) {
-                let (start_s, end_s) = (blocks.start_s[k], blocks.end_s[k]);
-                let after = ((end_s - step.time_s) / (end_s - start_s)).clamp(0.0, 1.0);
-                *force += step.size_n * after;
-            }
+            step.add_to(&blocks.start_s, &blocks.end_s, force_n, 1.0);
         }
     }
 

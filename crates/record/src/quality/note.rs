@@ -57,6 +57,9 @@ pub enum QualityKind {
     Quantisation,
     /// The recording was downsampled before use ([`mod@crate::downsample`]). Numbers: `from`, `to`, `together`.
     Downsampled,
+    /// The zero of the force sensor steps during the recording, or differs from that of the first recording; found by the
+    /// diagnosis. Numbers: `count`, `largest_n`, `at_s` (time of the largest), `offset_n` (zero at the start).
+    ZeroStep,
 }
 
 /// A note on the quality of a recording.

@@ -72,3 +72,42 @@ impl Effect for LoadingHysteresis {
         *state = [0.0; 8];
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Forces along a path of elastic forces, with steps of `step_n`.
+    fn along(path: &[f64], step_n: f64) -> Vec<f64> {
+        let effect = LoadingHysteresis { fraction: 0.4, reversal_n: 0.05 };
+        let (mut state, mut at) = ([0.0; 8], 0.0);
+        let mut ends = Vec::new();
+        for &to in path {
+            let steps = ((to - at) / step_n).abs().ceil().max(1.0);
+            let from = at;
+            let mut force = f64::NAN;
+            for k in 1..=steps as i32 {
+                at = from + (to - from) * f64::from(k) / steps;
+                force = effect.relax(0.01, at, &mut state);
+            }
+            ends.push(force);
+        }
+        ends
+    }
+
+    #[test]
+    fn first_loading_is_unchanged_and_unloading_runs_on_the_lower_branch() {
+        let [loaded, unloaded, reloaded] = along(&[1.0, 0.5, 1.0], 1e-3)[..] else { panic!("three ends") };
+        assert_eq!(loaded, 1.0);
+        assert!((unloaded - 0.5 * 0.6).abs() < 1e-4, "{unloaded}");
+        assert!((reloaded - 1.0).abs() < 1e-4, "{reloaded}");
+    }
+
+    #[test]
+    fn the_force_depends_on_the_path_and_not_on_the_steps() {
+        let path = [1.0, 0.97, 0.99, 0.6, 0.65];
+        for (a, b) in along(&path, 1e-3).iter().zip(along(&path, 0.2)) {
+            assert!((a - b).abs() < 1e-12, "{a} {b}");
+        }
+    }
+}
