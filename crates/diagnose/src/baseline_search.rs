@@ -63,6 +63,9 @@ pub(crate) fn search_with_baseline(
     }
 }
 
+/// Recordings with their steps, fit, and data with the noise of the fit.
+type Fitted = (PreparedRecordings, Fit, FitData);
+
 /// A fit of the base law with a baseline.
 struct Baseline {
     prepared: PreparedRecordings,
@@ -97,31 +100,36 @@ impl Baseline {
             let penalty = (count(&other.1) - count(&best.1)) * bic_penalty(1, blocks);
             likelihood_gain(&best.1, &other.1, &other.2).value() - penalty
         };
-        // Drops that no layer takes are steps.
-        let mut best = fitted(candidates.steps.clone())?;
-        let more = unassigned(&candidates.drops, &best.1);
-        let steps = more.fold(candidates.steps.clone(), |steps, drop| toggled(&steps, *drop));
-        if steps != candidates.steps
-            && let Some(other) = fitted(steps)
-            && gain_of(&other, &best) > MIN_GAIN_NATS
-        {
-            best = other;
-        }
         // As long as more than noise is left, a drop may be a step instead of a rupture, or the reverse.
-        for _ in 0..candidates.drops.len().min(MAX_EXCHANGES) {
-            if leaves_noise(&best.1, &best.2) {
-                break;
+        let exchanged = |mut best: Fitted| {
+            for _ in 0..MAX_EXCHANGES {
+                if leaves_noise(&best.1, &best.2) {
+                    break;
+                }
+                let others: Vec<(f64, Fitted)> = candidates
+                    .drops
+                    .par_iter()
+                    .take(MAX_ALTERNATIVES)
+                    .filter_map(|drop| fitted(toggled(&best.0.zero_steps, *drop)))
+                    .map(|other| (gain_of(&other, &best), other))
+                    .collect();
+                match others.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+                    Some((gain, other)) if gain > MIN_GAIN_NATS => best = other,
+                    _ => break,
+                }
             }
-            let others: Vec<_> = candidates
-                .drops
-                .par_iter()
-                .take(MAX_ALTERNATIVES)
-                .filter_map(|drop| fitted(toggled(&best.0.zero_steps, *drop)))
-                .map(|other| (gain_of(&other, &best), other))
-                .collect();
-            match others.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
-                Some((gain, other)) if gain > MIN_GAIN_NATS => best = other,
-                _ => break,
+            best
+        };
+        let mut best = exchanged(fitted(candidates.steps.clone())?);
+        if !leaves_noise(&best.1, &best.2) {
+            // Many steps: all drops that no layer takes.
+            let known = |drop: &&(usize, ZeroStep)| best.0.zero_steps[drop.0].contains(&drop.1);
+            let more = unassigned(&candidates.drops, &best.1).filter(|drop| !known(drop));
+            let steps = more.fold(best.0.zero_steps.clone(), |steps, drop| toggled(&steps, *drop));
+            if let Some(other) = fitted(steps).map(exchanged)
+                && gain_of(&other, &best) > MIN_GAIN_NATS
+            {
+                best = other;
             }
         }
         for _ in 0..RESIDUAL_ROUNDS {
