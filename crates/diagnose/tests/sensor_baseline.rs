@@ -17,17 +17,18 @@ const ASSUMED: &str = r#"Scenario(name: "two gels", motion: Recorded, tolerance:
 fn insertion(seed: u64, added_n: impl Fn(f64, f64) -> f64) -> NamedRecording {
     let scenario = Scenario::parse("assumed.ron", ASSUMED).expect("a scenario");
     let law = ForceLaw::new(&scenario.tissue, &[]).expect("a law");
+    // The velocity changes between samples.
+    let speed = |t: f64| match t - 0.0025 {
+        t if t < 15.0 => 0.002,
+        t if t < 18.0 => 0.0,
+        t if t < 33.0 => 0.003 + 0.001 * libm::sin(core::f64::consts::PI * t),
+        _ => -0.004,
+    };
     let (mut z, mut columns) = (-0.01, Vec::new());
     for k in 0..38 * 200 {
-        let t = k as f64 * 0.005;
-        let v = match t {
-            t if t < 15.0 => 0.002,
-            t if t < 18.0 => 0.0,
-            t if t < 33.0 => 0.003 + 0.001 * libm::sin(core::f64::consts::PI * t),
-            _ => -0.004,
-        };
-        columns.push((t, z, v));
-        z += 0.005 * v;
+        let t = f64::from(k) * 0.005;
+        columns.push((t, z, speed(t)));
+        z += (0..10).map(|i| 5e-4 * speed(t + 5e-4 * (f64::from(i) + 0.5))).sum::<f64>();
     }
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut force = Vec::new();

@@ -5,7 +5,7 @@
 //! | `assumptions`, `effect_term` | assumed tissue with tolerances; an effect with its parameter values |
 //! | `free_parameters`, `random_effects` | which parameters are free; parameters of recordings and days and their scatter |
 //! | `parameter`, `parameter_bounds`, `parameter_values` | what a parameter stands for; bounds and prior; its value |
-//! | `zero_steps` | steps of the sensor's zero in each recording |
+//! | `zero_steps`, `sensor_zero` | steps of the sensor's zero in each recording |
 //! | `compiled_model` | law and measurement chain of one recording |
 
 mod assumptions;
@@ -16,6 +16,7 @@ mod parameter;
 mod parameter_bounds;
 mod parameter_values;
 mod random_effects;
+mod sensor_zero;
 #[cfg(test)]
 mod tests;
 mod zero_steps;
