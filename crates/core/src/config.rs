@@ -50,6 +50,20 @@ pub enum Contact {
     Detected,
     /// At the surface position that the caller passes to the core.
     Known,
+    /// None is searched: the recording begins with the tip in the tissue, and forces are absolute.
+    None,
+}
+
+impl Contact {
+    /// Name of the setting, as `--contact` takes it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Contact::Detected => "auto",
+            Contact::Known => "known",
+            Contact::None => "none",
+        }
+    }
 }
 
 /// Prior knowledge of the layers' depths.

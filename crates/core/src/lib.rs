@@ -30,7 +30,9 @@ pub use config::EnhanceConfig;
 pub use enhancer::Enhancer;
 pub use paper::rls::Rls;
 pub use paper::state_machine::{TRANSITIONS, Transition, Trigger};
-pub use sample::{Cause, Detection, LayerEstimate, MAX_LAYERS, Output, Sample, State};
+pub use sample::{
+    Baseline, BaselineKind, Cause, Detection, LayerEstimate, MAX_LAYERS, Output, Sample, State, ZeroStep,
+};
 
 /// The example of the README.
 #[cfg(doctest)]

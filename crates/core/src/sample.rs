@@ -157,6 +157,72 @@ pub struct LayerEstimate {
     pub cumulative_sd: f64,
 }
 
+/// What the force did in air, apart from noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum BaselineKind {
+    /// A constant offset.
+    #[default]
+    Constant,
+    /// Drift in time.
+    Drift,
+    /// Linear in position: a cable, a guide, the weight of a tilted tool.
+    Line,
+    /// Drift or line: the motion in air does not separate them.
+    DriftOrLine,
+}
+
+impl BaselineKind {
+    /// Short name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            BaselineKind::Constant => "constant offset",
+            BaselineKind::Drift => "drift in time",
+            BaselineKind::Line => "line in position",
+            BaselineKind::DriftOrLine => "drift in time or line in position",
+        }
+    }
+}
+
+/// The baseline of the force that `Stylet` follows: `f = offset + drift (t - t_now) + line (z - z_now)`. Standard deviations are
+/// zero where nothing has been estimated.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Baseline {
+    /// Its form.
+    pub kind: BaselineKind,
+    /// Force without contact at this sample in N.
+    pub offset_n: f64,
+    /// Drift in N/s.
+    pub drift_n_per_s: f64,
+    /// Change with position in N/m.
+    pub line_n_per_m: f64,
+    /// Standard deviations of offset, drift and line.
+    pub sd: [f64; 3],
+    /// Steps of the zero so far.
+    pub zero_steps: usize,
+}
+
+/// A step of the sensor's zero (a tare, a slipping amplifier): a jump between two samples that is no rupture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct ZeroStep {
+    /// Time of the step in s.
+    pub time_s: f64,
+    /// Tip position at the step in m.
+    pub position_m: f64,
+    /// Size in N, positive upwards.
+    pub size_n: f64,
+    /// Standard deviation of the size in N.
+    pub sd_n: f64,
+    /// The needle was in tissue.
+    pub in_tissue: bool,
+    /// The rupture of this number was this step: it and its layer are withdrawn.
+    pub withdrawn: Option<usize>,
+}
+
 /// Result of one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Output {
@@ -183,8 +249,14 @@ pub struct Output {
     pub state: State,
     /// Number of ruptures declared so far.
     pub ruptures: usize,
-    /// Position of the first contact in m, once it is final.
+    /// Position of the first contact in m: the onset of the load, revised at the first rupture.
     pub contact_m: Option<f64>,
+    /// Standard deviation of `contact_m` in m; zero where the algorithm does not provide it (`Stylet`).
+    pub contact_sd_m: f64,
+    /// Baseline of the force (`Stylet`).
+    pub baseline: Baseline,
+    /// Step of the zero reported at this sample (`Stylet`).
+    pub zero_step: Option<ZeroStep>,
     /// Rupture declared at this sample.
     pub detection: Option<Detection>,
     /// Layer estimate that became available at this sample.

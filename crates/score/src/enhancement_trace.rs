@@ -5,7 +5,7 @@ use crate::offline_least_squares::{LayerSample, OfflineEstimate, fit_layer_offli
 use crate::score::Score;
 use crate::scorer::{Scorer, TrueSample};
 use stylet_core::config::{Algorithm, EnhanceConfig, Model};
-use stylet_core::{Detection, LayerEstimate, Sample, State};
+use stylet_core::{Baseline, Detection, LayerEstimate, Sample, State, ZeroStep};
 use stylet_record::LayerTruth;
 use stylet_record::{Recording, Truth};
 
@@ -42,6 +42,12 @@ pub struct Trace {
     pub contact_m: Option<f64>,
     /// Time at which the needle was first at that position, in s.
     pub contact_s: Option<f64>,
+    /// Standard deviation of the position of the contact in m; zero where the algorithm does not provide it.
+    pub contact_sd_m: f64,
+    /// Steps of the sensor's zero.
+    pub zero_steps: Vec<ZeroStep>,
+    /// Baseline of the force at the last sample.
+    pub baseline: Baseline,
     /// Samples that the core ignored.
     pub unused: usize,
 }
@@ -116,6 +122,14 @@ impl Trace {
 
     /// Records the ruptures, estimates and contact of a sample.
     pub fn record_events(&mut self, out: &stylet_core::Output) {
+        if let Some(step) = out.zero_step {
+            // A step of the zero that was declared as a rupture at first.
+            if let Some(layer) = step.withdrawn {
+                self.detections.retain(|d| d.layer != layer);
+                self.estimates.retain(|e| e.layer != layer);
+            }
+            self.zero_steps.push(step);
+        }
         self.detections.extend(out.detection);
         if let Some(estimate) = out.estimate {
             // A later estimate of a layer replaces the earlier one, which is among the last.
@@ -124,7 +138,7 @@ impl Trace {
             }
             self.estimates.push(estimate);
         }
-        self.contact_m = out.contact_m;
+        (self.contact_m, self.contact_sd_m, self.baseline) = (out.contact_m, out.contact_sd_m, out.baseline);
         self.unused += usize::from(!out.used);
     }
 

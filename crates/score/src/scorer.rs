@@ -95,8 +95,12 @@ impl Scorer {
         self.ruptures.push(rupture);
     }
 
-    /// Adds the detection and the layer estimate of a sample; samples without either may be omitted.
+    /// Adds the detection, the layer estimate and a withdrawal of a sample; samples without any may be omitted.
     pub fn add_event(&mut self, output: &Output) {
+        if let Some(layer) = output.zero_step.and_then(|step| step.withdrawn) {
+            self.detections.retain(|d| d.layer != layer);
+            self.estimates.retain(|e| e.layer != layer);
+        }
         self.detections.extend(output.detection);
         if let Some(estimate) = output.estimate {
             // A later estimate of a layer replaces the earlier one.

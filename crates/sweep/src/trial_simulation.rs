@@ -90,7 +90,7 @@ impl Block {
             if let Some(enhanced) = enhanced.next() {
                 *enhanced = out.into();
             }
-            if out.detection.is_some() || out.estimate.is_some() {
+            if out.detection.is_some() || out.estimate.is_some() || out.zero_step.is_some() {
                 scorer.add_event(out);
             }
         });

@@ -147,6 +147,12 @@ impl ForcePredictor {
         self.unpaired = true;
     }
 
+    /// All forces from here on are `by_n` larger.
+    pub(super) fn shift_level(&mut self, by_n: f64) {
+        self.belief.x[L] += by_n;
+        self.unpaired = true;
+    }
+
     /// Rate of the force in N/s at this speed and acceleration, without the part that a known friction (N s/m) contributes
     /// through the acceleration, and its variance in units of the noise variance. Under constant acceleration the terms are
     /// not separable, but their sum is.

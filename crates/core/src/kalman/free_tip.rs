@@ -83,6 +83,12 @@ impl FreeTipDetector {
         self.down.reset();
     }
 
+    /// Starts again from another estimator.
+    pub(super) fn restart_from(&mut self, estimator: &LayerEstimator) {
+        self.reset();
+        (self.up.snapshot, self.down.snapshot) = (*estimator, *estimator);
+    }
+
     /// There is no sign of an upward bend.
     pub(super) fn is_straight(&self) -> bool {
         self.up.slow == 0.0
@@ -141,7 +147,7 @@ impl FreeTipDetector {
         }
         estimator.start_after_bend(at_m, span_m / libm::sqrt(12.0), bent_up, drive, noise, passed_layers);
         self.reset();
-        (operations + OPERATIONS_PER_BEND, true)
+        (operations + OPERATIONS_PER_BEND + estimator.extra_operations(), true)
     }
 }
 

@@ -45,8 +45,20 @@ impl<const N: usize> Gaussian<N> {
         y: f64,
         r: f64,
     ) -> Innovation<N> {
+        self.leading_innovation::<N, M>(columns, h, y, r)
+    }
+
+    /// As [`Gaussian::innovation`] where only the first `R` unknowns are in use.
+    #[inline(always)]
+    pub(crate) fn leading_innovation<const R: usize, const M: usize>(
+        &self,
+        columns: [usize; M],
+        h: [f64; M],
+        y: f64,
+        r: f64,
+    ) -> Innovation<N> {
         let mut ph = [0.0; N];
-        for (i, ph) in ph.iter_mut().enumerate() {
+        for (i, ph) in ph.iter_mut().enumerate().take(R) {
             let mut sum = 0.0;
             for k in 0..M {
                 sum += self.cov(i, columns[k]) * h[k];
@@ -65,9 +77,15 @@ impl<const N: usize> Gaussian<N> {
     /// Measurement update: `x += P h e/s`, `P -= (P h)(P h)'/s`.
     #[inline(always)]
     pub(crate) fn update(&mut self, innovation: &Innovation<N>) {
+        self.leading_update::<N>(innovation);
+    }
+
+    /// As [`Gaussian::update`] where only the first `R` unknowns are in use.
+    #[inline(always)]
+    pub(crate) fn leading_update<const R: usize>(&mut self, innovation: &Innovation<N>) {
         let Innovation { e, s, ph } = innovation;
         let gain = 1.0 / s;
-        for i in 0..N {
+        for i in 0..R {
             let k = ph[i] * gain;
             self.x[i] += k * e;
             for j in 0..i {
@@ -90,20 +108,29 @@ impl<const N: usize> Gaussian<N> {
     }
 
     /// The distribution of `map x`.
+    #[cfg(test)]
     pub(crate) fn transformed(&self, map: &[[f64; N]; N]) -> Self {
-        let mut out = Self { x: [0.0; N], p: [[0.0; N]; N] };
+        self.leading_transformed::<N>(map)
+    }
+
+    /// The distribution of `map x` where only the first `R` unknowns are in use; the others are kept.
+    pub(crate) fn leading_transformed<const R: usize>(&self, map: &[[f64; N]; N]) -> Self {
+        let mut out = *self;
+        for i in 0..R {
+            (out.x[i], out.p[i]) = (0.0, [0.0; N]);
+        }
         let mut half = [[0.0; N]; N];
-        for i in 0..N {
-            for j in 0..N {
+        for i in 0..R {
+            for j in 0..R {
                 out.x[i] += map[i][j] * self.x[j];
-                for k in 0..N {
+                for k in 0..R {
                     half[i][j] += map[i][k] * self.cov(k, j);
                 }
             }
         }
-        for i in 0..N {
+        for i in 0..R {
             for j in 0..=i {
-                for k in 0..N {
+                for k in 0..R {
                     out.p[i][j] += half[i][k] * map[j][k];
                 }
                 out.p[j][i] = out.p[i][j];

@@ -1,18 +1,21 @@
 //! Layer parameters as one Gaussian state, updated with every sample since contact: the layer being traversed, the layer
 //! before it, and the cumulative friction of all layers passed.
 //!
-//! Unknowns `[D, K, b, K', b', f0]`. In a layer that starts at depth `s`, with `x = z - s` and the friction drive `u`,
+//! Unknowns `[D, K, b, K', b', f0, d, g]`. In a layer that starts at depth `s`, with `x = z - s` and the friction drive `u`,
 //!
 //! ```text
 //! f = f0 + D u + K x + b x u          D: friction of the passed layers
 //! f = f0 + p + q u + K x + b x u      first layer: p, q = K, b times the depth at which contact was detected
 //! ```
 //!
+//! and, where the force moved in air, `d t + g z` since contact: what the subtracted drift and line still lack.
+//!
 //! (`p` and `q` take the places of `D` and `K'`.) `f0` is the sensor bias, with a prior from the samples in air. At a
 //! rupture after a travel `d` the friction becomes `D + b d` (`q + b d` in the first layer) and the ruptured layer's `K, b`
 //! become `K', b'`: a linear map of the state. Samples after the rupture therefore still inform the split of the ruptured
 //! layer into stiffness and friction, and samples before it inform `D`: the joint least-squares solution without a buffer.
 
+use super::air_history::BaselineFit;
 use super::force_predictor::MEMORY_M;
 use super::gaussian::{Gaussian, Innovation, MAX_VARIANCE_RATIO, at_least};
 use super::noise_estimator::NoiseEstimator;
@@ -23,8 +26,14 @@ pub(crate) const K: usize = 1;
 pub(crate) const B: usize = 2;
 pub(crate) const K_PREV: usize = 3;
 pub(crate) const B_PREV: usize = 4;
-const BIAS: usize = 5;
-const N: usize = 6;
+pub(super) const BIAS: usize = 5;
+const DRIFT: usize = 6;
+const LINE: usize = 7;
+const N: usize = 8;
+/// Unknowns in use where the baseline is constant.
+const WITHOUT_BASELINE: usize = 6;
+/// Innovation of the estimator.
+pub(super) type LayerInnovation = Innovation<N>;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LayerEstimator {
@@ -52,8 +61,13 @@ pub(crate) struct LayerEstimator {
     /// Prior scale of the active layer's slope in N/m.
     slope_scale: f64,
     contact_drive: f64,
-    /// Depth, drive and force of the previous sample.
-    last: Option<[f64; 3]>,
+    /// Depth, drive, force and time since contact of the previous sample.
+    last: Option<[f64; 4]>,
+    /// The baseline moves: drift and line are unknowns.
+    moving_baseline: bool,
+    /// Position of the contact in m, and time since then in s.
+    contact_m: f64,
+    pub(super) elapsed_s: f64,
 }
 
 /// Start, end and friction per metre of the passed layers, each as it was known at the next rupture.
@@ -82,8 +96,10 @@ impl LayerEstimator {
             sd_n * sd_n / (drive * drive) * unit,
             1.0,
             noise.bias_variance() * unit,
+            0.0,
+            0.0,
         ];
-        let mean = [half, 0.5 * slope, 0.5 * friction, half / drive, 0.0, noise.bias_n()];
+        let mean = [half, 0.5 * slope, 0.5 * friction, half / drive, 0.0, noise.bias_n(), 0.0, 0.0];
         Self {
             belief: Gaussian::new(mean, variance),
             start_m,
@@ -101,7 +117,61 @@ impl LayerEstimator {
             slope_scale: slope,
             contact_drive: drive,
             last: None,
+            moving_baseline: false,
+            contact_m: start_m,
+            elapsed_s: 0.0,
         }
+    }
+
+    /// The baseline moved in air: its drift and line, subtracted from the force from here on, are uncertain as in `fit`.
+    pub(super) fn set_baseline(&mut self, fit: &BaselineFit, noise: &NoiseEstimator) {
+        let unit = 1.0 / noise.variance;
+        let g = &mut self.belief;
+        for (i, row) in [BIAS, DRIFT, LINE].into_iter().zip(fit.p) {
+            g.reset_component(i, if i == BIAS { noise.bias_n() } else { 0.0 }, row[i - BIAS] * unit);
+        }
+        for (i, row) in [BIAS, DRIFT, LINE].into_iter().zip(fit.p) {
+            for j in BIAS..i {
+                g.p[i][j] = row[j - BIAS] * unit;
+            }
+        }
+        self.moving_baseline = true;
+    }
+
+    /// The zero is uncertain by a further variance in N².
+    pub(super) fn widen_bias(&mut self, variance: f64, noise: &NoiseEstimator) {
+        self.belief.p[BIAS][BIAS] += variance / noise.variance;
+    }
+
+    /// Drift and line that the force still holds at a position, in N, and their variance in N²; `None` with a constant baseline.
+    #[inline(always)]
+    pub(super) fn baseline_residual_n(&self, position_m: f64, noise: &NoiseEstimator) -> Option<(f64, f64)> {
+        if !self.moving_baseline {
+            return None;
+        }
+        let (g, t, z) = (&self.belief, self.elapsed_s, position_m - self.contact_m);
+        let variance = t * t * g.p[DRIFT][DRIFT] + z * (z * g.p[LINE][LINE] + 2.0 * t * g.p[LINE][DRIFT]);
+        Some((t * g.x[DRIFT] + z * g.x[LINE], at_least(0.0, variance) * noise.variance))
+    }
+
+    fn transform(&mut self, map: &[[f64; N]; N]) {
+        self.belief = if self.moving_baseline {
+            self.belief.leading_transformed::<N>(map)
+        } else {
+            self.belief.leading_transformed::<WITHOUT_BASELINE>(map)
+        };
+    }
+
+    /// Multiplications and additions of a rupture or bend beyond those with a constant baseline.
+    pub(super) fn extra_operations(&self) -> u32 {
+        if self.moving_baseline { 2 * (512 - 216) + 2 * (288 - 126) } else { 0 }
+    }
+
+    /// What the subtracted drift and line lack, and standard deviations.
+    pub(super) fn baseline_residual(&self, noise: &NoiseEstimator) -> ([f64; 2], [f64; 2]) {
+        let g = &self.belief;
+        let sd = |i: usize| libm::sqrt(at_least(0.0, g.p[i][i]) * noise.variance);
+        ([g.x[DRIFT], g.x[LINE]], [sd(DRIFT), sd(LINE)])
     }
 
     /// The tip may be in a gap or still in air.
@@ -111,9 +181,9 @@ impl LayerEstimator {
     }
 
     #[inline(always)]
-    fn regressor(&self, x: f64, drive: f64) -> [f64; N] {
+    fn regressor(&self, x: f64, drive: f64, elapsed_s: f64) -> [f64; N] {
         let (a, q) = if self.passed_count > 0 { (drive, 0.0) } else { (1.0, drive) };
-        [a, x, x * drive, q, 0.0, 1.0]
+        [a, x, x * drive, q, 0.0, 1.0, elapsed_s, x + (self.start_m - self.contact_m)]
     }
 
     /// Total friction per drive, that of the active layer included.
@@ -125,7 +195,7 @@ impl LayerEstimator {
     /// Force in N that the base law predicts.
     #[inline(always)]
     pub(crate) fn predict(&self, position_m: f64, drive: f64) -> f64 {
-        let w = self.regressor(position_m - self.start_m, drive);
+        let w = self.regressor(position_m - self.start_m, drive, self.elapsed_s);
         w.iter().zip(&self.belief.x).map(|(w, x)| w * x).sum()
     }
 
@@ -138,12 +208,13 @@ impl LayerEstimator {
 
     /// Innovation of a sample, whitened with the previous one.
     #[inline(always)]
-    pub(crate) fn innovation(&self, position_m: f64, drive: f64, force_n: f64, rho: f64) -> Innovation<6> {
+    pub(crate) fn innovation(&self, position_m: f64, drive: f64, force_n: f64, rho: f64) -> LayerInnovation {
+        const R: usize = WITHOUT_BASELINE;
         let x = position_m - self.start_m;
-        let (mut w, mut y, mut r) = (self.regressor(x, drive), force_n, 1.0);
+        let (mut w, mut y, mut r) = (self.regressor(x, drive, self.elapsed_s), force_n, 1.0);
         if rho != 0.0 {
-            if let Some([x, drive, force_n]) = self.last {
-                for (w, before) in w.iter_mut().zip(self.regressor(x, drive)) {
+            if let Some([x, drive, force_n, elapsed_s]) = self.last {
+                for (w, before) in w.iter_mut().zip(self.regressor(x, drive, elapsed_s)) {
                     *w -= rho * before;
                 }
                 y -= rho * force_n;
@@ -151,10 +222,15 @@ impl LayerEstimator {
                 r = 1.0 / (1.0 - rho * rho);
             }
         }
+        if self.moving_baseline {
+            let columns = [D, K, B, K_PREV, BIAS, DRIFT, LINE];
+            return self.belief.innovation(columns, columns.map(|i| w[i]), y, r);
+        }
         if self.passed_count > 0 {
-            self.belief.innovation([D, K, B, BIAS], [w[D], w[K], w[B], w[BIAS]], y, r)
+            self.belief.leading_innovation::<R, 4>([D, K, B, BIAS], [w[D], w[K], w[B], w[BIAS]], y, r)
         } else {
-            self.belief.innovation([D, K, B, K_PREV, BIAS], [w[D], w[K], w[B], w[K_PREV], w[BIAS]], y, r)
+            let columns = [D, K, B, K_PREV, BIAS];
+            self.belief.leading_innovation::<R, 5>(columns, columns.map(|i| w[i]), y, r)
         }
     }
 
@@ -162,13 +238,17 @@ impl LayerEstimator {
     #[inline(always)]
     pub(crate) fn apply(
         &mut self,
-        innovation: &Innovation<6>,
+        innovation: &LayerInnovation,
         position_m: f64,
         drive: f64,
         force_n: f64,
     ) -> (f64, f64) {
-        self.belief.update(innovation);
-        self.last = Some([position_m - self.start_m, drive, force_n]);
+        if self.moving_baseline {
+            self.belief.update(innovation);
+        } else {
+            self.belief.leading_update::<WITHOUT_BASELINE>(innovation);
+        }
+        self.last = Some([position_m - self.start_m, drive, force_n, self.elapsed_s]);
         (innovation.e, innovation.s)
     }
 
@@ -227,8 +307,10 @@ impl LayerEstimator {
         map[D][B] = d;
         map[K_PREV][K] = 1.0;
         map[B_PREV][B] = 1.0;
-        map[BIAS][BIAS] = 1.0;
-        self.belief = self.belief.transformed(&map);
+        for i in [BIAS, DRIFT, LINE] {
+            map[i][i] = 1.0;
+        }
+        self.transform(&map);
         if self.start_sd_m > 0.0 {
             // A misplaced start of the ruptured layer looked like a change of the bias.
             self.belief.reset_component(BIAS, noise.bias_n(), noise.bias_variance() * unit);
@@ -312,7 +394,7 @@ impl LayerEstimator {
             row[i] = 1.0;
         }
         map[D][B] = travel;
-        self.belief = self.belief.transformed(&map);
+        self.transform(&map);
         // The previous layer reaches to here if its friction kept growing.
         if let Some(slot) = self.passed_count.checked_sub(1).and_then(|i| passed_layers.get_mut(i))
             && b > 0.5 * self.belief.x[B_PREV]

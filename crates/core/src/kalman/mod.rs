@@ -1,6 +1,8 @@
 //! [`Algorithm::Stylet`](crate::config::Algorithm::Stylet): Kalman filters for the next force and for the layers, CUSUM
 //! rupture alarm, one pass, bounded work per sample. Derivation: `docs/enhancer.md`.
 
+mod air_history;
+mod baseline;
 mod contact_detection;
 mod cusum;
 mod force_predictor;
@@ -16,6 +18,7 @@ mod shaft_friction;
 mod state;
 mod tissue_update;
 mod velocity_estimator;
+mod zero_step;
 
 #[cfg(test)]
 mod test_support;
@@ -41,6 +44,7 @@ impl KalmanEnhancer {
     pub(crate) fn step(&mut self, config: &EnhanceConfig, surface_m: f64, sample: Sample) -> &Output {
         self.output.detection = None;
         self.output.estimate = None;
+        self.output.zero_step = None;
         self.operations = OPERATIONS_PER_SAMPLE;
         let in_range = sample.velocity_mps.abs() < MAX_SPEED_MPS && sample.position_m.abs() < MAX_POSITION_M;
         // Two samples at almost the same time say nothing about the velocity.
@@ -51,6 +55,9 @@ impl KalmanEnhancer {
         if !self.output.used {
             return &self.output;
         }
+        self.baseline.measured_n = sample.force_n;
+        let subtracted_n = self.baseline.subtracted_n(sample.time_s, sample.position_m);
+        let sample = Sample { force_n: sample.force_n - subtracted_n, ..sample };
         let last = if self.started { self.last_sample } else { sample };
         let (velocity_mps, sudden) =
             self.velocity_estimator.update(&last, &sample, self.speed_mps, self.low_pass_gains[3]);
@@ -58,6 +65,9 @@ impl KalmanEnhancer {
         let sample = Sample { velocity_mps, ..sample };
         let step = self.motion_step(config, &last, &sample, sudden);
         self.update_friction_drive(config, &step, &sample);
+        if self.in_tissue && !self.baseline.settled {
+            self.verify_evidence(config, &sample);
+        }
         if self.in_tissue {
             self.update_in_tissue(config, &step, &sample);
         } else {

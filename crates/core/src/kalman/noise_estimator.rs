@@ -85,6 +85,26 @@ impl NoiseEstimator {
         }
     }
 
+    /// Starts again from a mean force in air known from `count` samples with this marginal variance and correlation; the last
+    /// force was `last_n`.
+    #[cold]
+    pub(crate) fn restart_in_air(&mut self, mean_n: f64, variance: f64, rho: f64, count: f64, last_n: f64) {
+        self.first_n = mean_n;
+        self.sums = [0.0, count * variance, count * rho * variance, count];
+        (self.waiting, self.incoming) = ([0.0; 4], [0.0; 4]);
+        self.last_n = last_n - mean_n;
+        self.sample_count = count;
+        self.rho = rho;
+        self.variance = (variance * (1.0 - rho * rho)).max(self.min_variance);
+        self.bias_n = mean_n;
+        self.update_derived();
+    }
+
+    /// Lower bound on the variance in N².
+    pub(crate) fn min_variance(&self) -> f64 {
+        self.min_variance
+    }
+
     /// Takes a sample in air. Samples count only when at least twice as many have followed without a contact, so that a
     /// slowly rising load is not learned as noise.
     pub(crate) fn update_in_air(&mut self, force_n: f64) {

@@ -78,6 +78,14 @@ impl KalmanEnhancer {
                 (friction, variance) = (dry_n, sd * sd);
             }
         }
+        let mut baseline_n = 0.0;
+        if let Some((residual_n, residual_variance)) =
+            self.estimator.baseline_residual_n(sample.position_m, &self.noise)
+            && self.in_tissue
+        {
+            baseline_n = residual_n;
+            variance += residual_variance;
+        }
         let out = &mut self.output;
         out.state = if out.detection.is_some() {
             State::DetectedRupture
@@ -87,7 +95,7 @@ impl KalmanEnhancer {
             State::NoRupture
         };
         out.cumulative_friction_ns_per_m = friction_per_drive;
-        out.enhanced_n = sample.force_n - friction;
+        out.enhanced_n = sample.force_n - friction - baseline_n;
         let half = Z95 * libm::sqrt(marginal + at_least(0.0, variance));
         out.band_n = Some([out.enhanced_n - half, out.enhanced_n + half]);
     }
@@ -127,8 +135,10 @@ impl KalmanEnhancer {
 
     /// Fills in the fields that only [`Enhancer::step`](crate::Enhancer::step) returns.
     pub(crate) fn complete_output(&mut self, sample: &Sample) -> &Output {
+        let baseline = self.baseline_now(sample);
         let out = &mut self.output;
         if out.used {
+            out.baseline = baseline;
             out.reconstructed_n = if self.in_tissue { sample.force_n - out.error_n } else { 0.0 };
             out.cusum_n2 = self.cusum.relative_level();
             if self.in_tissue {

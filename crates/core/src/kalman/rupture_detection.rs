@@ -112,6 +112,8 @@ impl KalmanEnhancer {
         let force = (sample.force_n - self.noise.bias_n()).abs().max(sd);
         self.predictor.restart(sample.force_n, force, &self.noise, step.speed_mps, false);
         self.reset_detector();
+        // The zero does not go on falling.
+        self.rival = None;
         if let Some(post_rupture) = self.post_rupture {
             self.estimator = post_rupture;
         }
@@ -126,6 +128,7 @@ impl KalmanEnhancer {
             self.report_previous_layer(sample);
         }
         let bias = self.noise.bias_n();
+        self.rival = self.rival_of_rupture(sample);
         let span = (sample.position_m - self.snapshot_m).max(0.0);
         // A rupture shown by one sample lies half a step before it; one accumulated over many began where the sum left zero,
         // to within a step.
@@ -135,12 +138,15 @@ impl KalmanEnhancer {
         let drive = self.steady_drive_mps.max(1e-6);
         let predicted = self.predictor.level_n();
         self.estimator = self.snapshot;
-        self.operations += OPERATIONS_PER_RUPTURE;
+        self.operations += OPERATIONS_PER_RUPTURE + self.estimator.extra_operations();
         self.estimator.rupture(at_m, sd_m, drive, &self.noise, &mut self.passed_layers);
         self.post_rupture = Some(self.estimator);
         self.time_since_rupture_s = 0.0;
         (self.drop_onset, self.time_since_falling_s) = (None, f64::INFINITY);
         (self.pre_rupture, self.alarm_m) = (self.snapshot, sample.position_m);
+        let after = self.estimator;
+        self.set_rupture(&after);
+        self.compare_rival(sample, step.rho);
         self.estimator.update(sample.position_m, self.friction_drive_mps, sample.force_n, step.rho);
         let force = (sample.force_n - bias).abs().max((predicted - sample.force_n).abs());
         self.predictor.restart(sample.force_n, force, &self.noise, step.speed_mps, false);
@@ -150,7 +156,7 @@ impl KalmanEnhancer {
         self.snapshot_m = sample.position_m;
         self.samples_since_rupture = 0;
         self.next_report_at = 16;
-        if self.output.ruptures == 0 {
+        if self.output.ruptures == 0 && !self.contact_given {
             self.output.contact_m = Some(self.estimator.start_m - self.estimator.previous_thickness_m);
         }
         self.output.ruptures += 1;
@@ -227,7 +233,7 @@ impl KalmanEnhancer {
         let span_m = self.alarm_m - located_m;
         let earliest_m = located_m - at_least(MEMORY_M, span_m);
         let onset_m = at_most(self.alarm_m, at_least(earliest_m, onset_m));
-        self.operations += OPERATIONS_PER_RUPTURE;
+        self.operations += OPERATIONS_PER_RUPTURE + self.estimator.extra_operations();
         self.estimator = self.pre_rupture;
         let drive = self.steady_drive_mps.max(1e-6);
         self.estimator.rupture(

@@ -1,5 +1,6 @@
 //! State of the algorithm between samples.
 
+use super::baseline::AirBaseline;
 use super::cusum::CusumBank;
 use super::force_predictor::ForcePredictor;
 use super::free_tip::FreeTipDetector;
@@ -7,6 +8,7 @@ use super::layer_estimator::{LayerEstimator, PassedLayers};
 use super::noise_estimator::NoiseEstimator;
 use super::shaft_friction::DryShaftFriction;
 use super::velocity_estimator::VelocityEstimator;
+use super::zero_step::{Jump, Rival};
 use crate::config::EnhanceConfig;
 use crate::sample::{Output, Sample};
 
@@ -46,7 +48,16 @@ pub(crate) struct KalmanEnhancer {
     pub(super) speed_mps: f64,
     pub(super) low_passed_n: f64,
     pub(super) samples_above_threshold: u32,
+    pub(super) samples_below_threshold: u32,
+    /// Count of samples away from the baseline at which the air is looked at next.
+    pub(super) next_look_at: u32,
+    pub(super) baseline: AirBaseline,
+    /// The contact was given and is not revised.
+    pub(super) contact_given: bool,
     pub(super) spike_samples: u8,
+    pub(super) jump: Jump,
+    /// The last rupture, as a step of the zero.
+    pub(super) rival: Option<Rival>,
     /// The decision on the last sample, far from the prediction, waits for the next: the velocity may have jumped.
     pub(super) deferred: bool,
     /// Samples since the last rupture, and the count at which the ruptured layer is reported next.
@@ -124,7 +135,13 @@ impl KalmanEnhancer {
             speed_mps: 0.0,
             low_passed_n: 0.0,
             samples_above_threshold: 0,
+            samples_below_threshold: 0,
+            next_look_at: 0,
+            baseline: AirBaseline::new(noise.min_variance()),
+            contact_given: false,
             spike_samples: 0,
+            jump: Jump::default(),
+            rival: None,
             deferred: false,
             samples_since_rupture: 0,
             next_report_at: u32::MAX,

@@ -18,8 +18,10 @@ pub(super) fn inside() -> KalmanEnhancer {
     stylet.predictor = ForcePredictor::new(1.5);
     stylet.predictor.belief = Gaussian::new([1.5, 0.0, 0.0, 0.0, 0.0], [3.0, 0.0, 0.0, 0.0, 0.0]);
     stylet.estimator = LayerEstimator::at_contact(0.0, 0.0, 0.0, 100.0, 0.002, &stylet.noise);
-    stylet.estimator.belief =
-        Gaussian::new([0.6, 60.0, 9000.0, 25.0, 0.0, 0.07], [0.0, 0.0, 0.0, 0.0, 0.0, 0.5]);
+    stylet.estimator.belief = Gaussian::new(
+        [0.6, 60.0, 9000.0, 25.0, 0.0, 0.07, 0.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0],
+    );
     stylet.estimator.layer_confirmed = true;
     (stylet.snapshot, stylet.snapshot_m) = (stylet.estimator, 0.0097);
     (stylet.in_tissue, stylet.started, stylet.last_sample) = (true, true, sample(0.0099, 1.5));

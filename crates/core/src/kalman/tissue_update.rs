@@ -1,8 +1,8 @@
 //! A sample in the tissue: prediction, spike and rupture tests, and the updates of predictor, layer estimator and noise.
 
 use super::force_predictor::{self, ForcePredictor, MotionStep};
-use super::gaussian::{Innovation, at_least, at_most};
-use super::layer_estimator::LayerEstimator;
+use super::gaussian::{at_least, at_most};
+use super::layer_estimator::{LayerEstimator, LayerInnovation};
 use super::noise_estimator::NoiseEstimator;
 use super::state::{
     FAILED_MISFIT, KalmanEnhancer, MAX_DROP_DURATION_S, MAX_STIFFNESS_N_PER_M, OPERATIONS_PER_RUPTURE,
@@ -20,7 +20,7 @@ const OPERATIONS_PER_LAYER_INNOVATION: u32 = 2 * 35;
 const OPERATIONS_PER_LAYER_UPDATE: u32 = 2 * 27 + 12;
 /// Misfit up to which the layer estimator feeds the alarm. If all the excess over one were a constant offset, of 0.45 standard
 /// deviations, the CUSUMs would not drift.
-const MAX_ALARM_MISFIT: f64 = 1.2;
+pub(super) const MAX_ALARM_MISFIT: f64 = 1.2;
 /// Relative deviation from the usual speed up to which it does.
 const MAX_SPEED_DEVIATION: f64 = 0.05;
 /// Limits on squared standardised innovations, so that one sample does not dominate a mean.
@@ -32,6 +32,7 @@ impl KalmanEnhancer {
     pub(super) fn update_in_tissue(&mut self, config: &EnhanceConfig, step: &MotionStep, sample: &Sample) {
         let force_n = sample.force_n;
         self.restart_if_invalid(step, sample);
+        self.estimator.elapsed_s += step.dt_s;
         self.operations += OPERATIONS_PER_PREDICTION;
         self.predictor.advance(step, &self.noise);
         if step.sudden {
@@ -59,15 +60,18 @@ impl KalmanEnhancer {
         }
         let travel_gain = step.dz_m.abs() / (step.dz_m.abs() + 2.0 * force_predictor::MEMORY_M);
         // A spike goes up, or below what any rupture leaves, and is short.
-        let below_bias =
-            force_n - self.noise.bias_n() < -SPIKE_SDS * libm::sqrt(self.noise.marginal_variance());
-        let outlier = z > SPIKE_SDS || (forward && z < -SPIKE_SDS && below_bias);
+        let outlier = z > SPIKE_SDS || (forward && z < -SPIKE_SDS && self.is_below_ruptures(sample));
         // A release of the shaft lasts as long as a drop.
         self.release_window_s =
             if z > SPIKE_SDS && !forward { MAX_DROP_DURATION_S } else { self.release_window_s - step.dt_s };
         if outlier && forward && self.spike_samples < MAX_SPIKE_SAMPLES {
             self.spike_samples += 1;
+            self.is_lasting_jump(sample, (innovation.e, innovation.s));
             self.skip_sample();
+            return;
+        }
+        if outlier && forward && self.is_lasting_jump(sample, (innovation.e, innovation.s)) {
+            self.accept_jump();
             return;
         }
         if outlier {
@@ -121,6 +125,7 @@ impl KalmanEnhancer {
         }
         self.drop_continues = self.post_rupture.is_some() && self.drop_is_ongoing(step, sample);
         if self.drop_continues {
+            self.rival = None;
             if let Some(post_rupture) = self.post_rupture {
                 self.estimator = post_rupture;
             }
@@ -142,7 +147,7 @@ impl KalmanEnhancer {
         config: &EnhanceConfig,
         step: &MotionStep,
         sample: &Sample,
-        innovation: Option<Innovation<6>>,
+        innovation: Option<LayerInnovation>,
         travel_gain: f64,
     ) {
         let (position_m, force_n, drive) = (sample.position_m, sample.force_n, self.friction_drive_mps);
@@ -152,6 +157,12 @@ impl KalmanEnhancer {
             self.estimator.innovation(position_m, drive, force_n, step.rho)
         });
         let (e, s) = self.estimator.apply(&innovation, position_m, drive, force_n);
+        if self.rival.is_some() {
+            self.compare_rival(sample, step.rho);
+            if self.decide_rival(sample) {
+                return;
+            }
+        }
         self.operations += OPERATIONS_PER_LAYER_UPDATE;
         let z = e / libm::sqrt(s * self.noise.variance);
         if self.estimator.passed_count == 0 {
@@ -193,15 +204,22 @@ impl KalmanEnhancer {
         self.min_drop_n = weight * config.stylet.min_drop_share * self.peak_force_n;
     }
 
+    /// The force lies below what any rupture leaves.
+    #[cold]
+    fn is_below_ruptures(&self, sample: &Sample) -> bool {
+        let margin_n = SPIKE_SDS * libm::sqrt(self.noise.marginal_variance());
+        sample.force_n - self.lowest_after_rupture_n(sample.position_m) < -margin_n
+    }
+
     #[inline(always)]
-    fn skip_sample(&mut self) {
+    pub(super) fn skip_sample(&mut self) {
         self.predictor.skip_sample();
         self.estimator.skip_sample();
     }
 
     /// Innovation of the layer estimator where it may feed the alarm: the base law holds and the speed is the usual one.
     #[inline(always)]
-    fn layer_innovation(&mut self, step: &MotionStep, sample: &Sample) -> Option<Innovation<6>> {
+    fn layer_innovation(&mut self, step: &MotionStep, sample: &Sample) -> Option<LayerInnovation> {
         let estimator = &self.estimator;
         let holds = self.misfit_weight == 0.0
             && self.misfit < MAX_ALARM_MISFIT

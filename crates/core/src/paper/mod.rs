@@ -206,6 +206,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
                 (self.traversal.start_m, index, true)
             }
             Contact::Known => return,
+            Contact::None => (sample.position_m, index, true),
             Contact::Detected => {
                 match self.contact.update(&self.config.contact_search, dt_s, sample, index) {
                     ContactStatus::InAir => return,
@@ -217,7 +218,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
         if !self.in_contact {
             // A needle known to start inside the tissue is blind from its start position.
             let blind_from_m = match self.config.contact {
-                Contact::Known => sample.position_m,
+                Contact::Known | Contact::None => sample.position_m,
                 Contact::Detected => start_m,
             };
             self.begin_layer(start_m, blind_from_m, first);

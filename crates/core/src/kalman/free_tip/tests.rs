@@ -115,7 +115,7 @@ fn a_free_tip_needs_odds_of_twenty_and_four_hundred_against_the_other_case() {
         assert_eq!((estimator.tip_free, estimator.layer_confirmed), (free, settled), "{follows} {ends}");
         // Conditioned on zero stiffness and on the previous layer's friction or none.
         let mut expected = was;
-        let variance = |g: &crate::kalman::gaussian::Gaussian<6>, i: usize| 1e-9 * g.p[i][i];
+        let variance = |g: &crate::kalman::gaussian::Gaussian<8>, i: usize| 1e-9 * g.p[i][i];
         if free {
             let none = expected.innovation([K], [1.0], 0.0, variance(&expected, K));
             expected.update(&none);
@@ -290,7 +290,8 @@ fn an_upward_bend_ends_the_gap_and_a_downward_bend_its_friction_growth() {
 #[test]
 fn a_singular_covariance_has_a_finite_density() {
     let (mut estimator, noise) = behind_a_rupture(0.0, 9000.0);
-    estimator.belief = crate::kalman::gaussian::Gaussian::new([0.0; 6], [1.0, 4.0, 9.0, 1.0, 1.0, 1.0]);
+    estimator.belief =
+        crate::kalman::gaussian::Gaussian::new([0.0; 8], [1.0, 4.0, 9.0, 1.0, 1.0, 1.0, 0.0, 0.0]);
     estimator.belief.p[B][K] = 6.0;
     // The determinant is limited to 1e-12 of that without correlation.
     near(estimator.log_density_of_free(false, &noise), -0.5 * 36e-12_f64.ln());

@@ -150,10 +150,14 @@ fn correlated(passed: usize) -> (LayerEstimator, NoiseEstimator) {
     let noise = NoiseEstimator::known(0.0, 1.6e-3, 0.07, 400.0);
     let mut estimator = LayerEstimator::at_contact(0.013, 0.7, 0.3, 1700.0, 0.0023, &noise);
     let map = core::array::from_fn(|i| {
-        core::array::from_fn(|j| if i == j { 1.0 } else { 0.1 * (i as f64 - 0.7 * j as f64) })
+        core::array::from_fn(|j| match (i, j) {
+            _ if i == j => 1.0,
+            (..WITHOUT_BASELINE, ..WITHOUT_BASELINE) => 0.1 * (i as f64 - 0.7 * j as f64),
+            _ => 0.0,
+        })
     });
-    estimator.belief = Gaussian::new([0.0; N], [1.3, 4.0, 0.25, 2.0, 0.5, 0.7]).transformed(&map);
-    estimator.belief.x = [130.0, 57.0, 8300.0, 44.0, 7100.0, 0.06];
+    estimator.belief = Gaussian::new([0.0; N], [1.3, 4.0, 0.25, 2.0, 0.5, 0.7, 0.0, 0.0]).transformed(&map);
+    estimator.belief.x = [130.0, 57.0, 8300.0, 44.0, 7100.0, 0.06, 0.0, 0.0];
     (estimator.start_m, estimator.previous_thickness_m, estimator.passed_count) = (0.031, 0.018, passed);
     (estimator.gap_m, estimator.gap_sd_m, estimator.previous_start_sd_m) = (0.0037, 3e-4, 5e-4);
     (estimator.slope_scale, estimator.layer_confirmed) = (90.0, true);
@@ -192,7 +196,7 @@ fn at_contact_half_of_the_force_is_elastic_and_slopes_have_wide_priors() {
     let noise = NoiseEstimator::known(0.0, 1.6e-3, 0.07, 400.0);
     let estimator = LayerEstimator::at_contact(0.013, 0.7, 0.3, 1700.0, 0.0023, &noise);
     let g = &estimator.belief;
-    assert_eq!(g.x, [0.35, 850.0, 0.5 * (1700.0 / 0.0023), 0.35 / 0.0023, 0.0, 0.07]);
+    assert_eq!(g.x, [0.35, 850.0, 0.5 * (1700.0 / 0.0023), 0.35 / 0.0023, 0.0, 0.07, 0.0, 0.0]);
     let sds = [0.3, 1700.0, 1700.0 / 0.0023, 0.3 / 0.0023, 0.04, 0.002];
     for (i, sd) in sds.into_iter().enumerate() {
         near((g.p[i][i] * noise.variance).sqrt(), sd, 1e-12);
@@ -213,7 +217,11 @@ fn an_update_uses_the_whitened_regressor() {
         let (mut estimator, _) = correlated(passed);
         let h = |z: f64, u: f64| {
             let x = z - 0.031;
-            if passed == 0 { [1.0, x, x * u, u, 0.0, 1.0] } else { [u, x, x * u, 0.0, 0.0, 1.0] }
+            if passed == 0 {
+                [1.0, x, x * u, u, 0.0, 1.0, 0.0, 0.0]
+            } else {
+                [u, x, x * u, 0.0, 0.0, 1.0, 0.0, 0.0]
+            }
         };
         let samples = [(0.0347, 0.7, 3.1), (0.0391, 1.9, 2.7), (0.0402, 0.3, 9.9)];
         let mut before: Option<(f64, f64, f64)> = None;
@@ -275,7 +283,7 @@ fn shaft_friction_grows_with_travel_while_the_tip_is_free() {
     estimator.tip_free = true;
     let (found, variance) = estimator.shaft_friction(0.0345, &noise);
     near(found, 130.0 + 8300.0 * 0.0035, 1e-12);
-    near(variance, spread(&p, &[1.0, 0.0, 0.0035, 0.0, 0.0, 0.0]) * 1.6e-3, 1e-12);
+    near(variance, spread(&p, &[1.0, 0.0, 0.0035, 0.0, 0.0, 0.0, 0.0, 0.0]) * 1.6e-3, 1e-12);
     // None before the start of the layer, and none in the first layer.
     near(estimator.shaft_friction(0.02, &noise).0, 130.0, 1e-12);
     assert_eq!(correlated(0).0.shaft_friction(0.0345, &noise), (0.0, 0.0));
@@ -283,7 +291,7 @@ fn shaft_friction_grows_with_travel_while_the_tip_is_free() {
     let (gave_way, variance) = estimator.friction_at_rupture(&noise);
     near(gave_way, 130.0 - 0.0037 * 7100.0, 1e-12);
     let place = 7100.0 * 3e-4;
-    near(variance, spread(&p, &[1.0, 0.0, 0.0, 0.0, -0.0037, 0.0]) * 1.6e-3 + place * place, 1e-9);
+    near(variance, spread(&p, &[1.0, 0.0, 0.0, 0.0, -0.0037, 0.0, 0.0, 0.0]) * 1.6e-3 + place * place, 1e-9);
 }
 
 #[test]
@@ -367,6 +375,9 @@ fn a_rupture_transforms_the_state_and_starts_a_layer_with_a_wide_prior() {
         let (g, mut passed_layers) = (estimator.belief, PassedLayers::default());
         passed_layers[1] = [0.013, 0.031, 5.0];
         let mut map = Matrix::default();
+        for i in WITHOUT_BASELINE..N {
+            map[i][i] = 1.0;
+        }
         (map[D][D], map[D][B]) = (1.0, 0.0121);
         (map[K_PREV][K], map[B_PREV][B], map[BIAS][BIAS]) = (1.0, 1.0, 1.0);
         let (x, p) = after_a_rupture(&map, (&g, &noise), [before, stiff(&g, &noise, before)], friction);
@@ -395,6 +406,9 @@ fn a_rupture_after_a_gap_resets_the_bias() {
     let (mut g, mut passed_layers) = (estimator.belief, PassedLayers::default());
     passed_layers[1] = [0.013, 0.031, 5.0];
     let mut map = Matrix::default();
+    for i in WITHOUT_BASELINE..N {
+        map[i][i] = 1.0;
+    }
     (map[D][D], map[D][B], map[K_PREV][K], map[B_PREV][B]) = (1.0, 1e-6, 1.0, 1.0);
     // The tip was not free: any part of the slope of 24.9 N/m may have been elastic.
     (g.x[K], g.x[B]) = (12.45, 41.5);
@@ -417,7 +431,7 @@ fn a_rupture_after_a_gap_resets_the_bias() {
 fn reopening_the_split_is_limited_by_the_noise() {
     for (friction, half) in [(400.0, 60.0), (1e9, 1000.0), (-1e9, -1000.0)] {
         let (mut estimator, _) = correlated(2);
-        estimator.belief = Gaussian::new([130.0, 0.0, friction, 44.0, 7100.0, 0.06], [1.0; N]);
+        estimator.belief = Gaussian::new([130.0, 0.0, friction, 44.0, 7100.0, 0.06, 0.0, 0.0], [1.0; N]);
         estimator.reopen_split(0.3, 1e8);
         near(estimator.belief.x[K], half, 1e-9);
         near(estimator.belief.p[K][K], 1.0 + half * half * 1e8, 1e-9);
@@ -454,11 +468,14 @@ fn the_first_layer_began_before_contact_by_force_over_slope() {
         let delta = inside_m.unwrap_or(0.0);
         if inside_m.is_some() {
             // Constraint p = K delta with the variance of the force.
-            let r = spread(&full(&g), &[1.0, 0.0, 0.0, 0.0023, 0.0, 0.0]);
+            let r = spread(&full(&g), &[1.0, 0.0, 0.0, 0.0023, 0.0, 0.0, 0.0, 0.0]);
             let p_is_k_delta = g.innovation([D, K], [1.0, -delta], 0.0, r);
             g.update(&p_is_k_delta);
         }
         let mut map = Matrix::default();
+        for i in WITHOUT_BASELINE..N {
+            map[i][i] = 1.0;
+        }
         (map[D][K_PREV], map[D][B], map[K_PREV][K], map[B_PREV][B], map[BIAS][BIAS]) =
             (1.0, 0.0121, 1.0, 1.0, 1.0);
         let before = (g.x[K] + g.x[B] * 0.3).abs().max(1.0);
@@ -476,7 +493,10 @@ fn the_first_layer_began_before_contact_by_force_over_slope() {
     }
     // The constraint has a minimal variance.
     let (mut estimator, noise) = correlated(0);
-    estimator.belief = Gaussian::new([0.13, 57.0, 83.0, 0.9, 0.0, 0.0], [1e-9, 1e-9, 0.1, 1e-9, 0.1, 0.1]);
+    estimator.belief = Gaussian::new(
+        [0.13, 57.0, 83.0, 0.9, 0.0, 0.0, 0.0, 0.0],
+        [1e-9, 1e-9, 0.1, 1e-9, 0.1, 0.1, 0.0, 0.0],
+    );
     let inside_m = (0.13 + 0.9 * 0.0023) / (57.0 + 83.0 * 0.0023);
     estimator.rupture(0.0431, 6e-4, 0.3, &noise, &mut PassedLayers::default());
     let kept = 57.0 + 1e-9 * inside_m * (0.13 - 57.0 * inside_m) / (1e-6 + 1e-9 + 1e-9 * inside_m * inside_m);

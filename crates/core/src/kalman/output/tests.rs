@@ -9,7 +9,10 @@ use crate::kalman::gaussian::Gaussian;
 fn second() -> KalmanEnhancer {
     let mut stylet = inside();
     let l = &mut stylet.estimator;
-    l.belief = Gaussian::new([200.0, 60.0, 9000.0, 50.0, 8000.0, 0.07], [900.0, 4.0, 5.0, 6.0, 7.0, 0.5]);
+    l.belief = Gaussian::new(
+        [200.0, 60.0, 9000.0, 50.0, 8000.0, 0.07, 0.0, 0.0],
+        [900.0, 4.0, 5.0, 6.0, 7.0, 0.5, 0.0, 0.0],
+    );
     (l.passed_count, l.previous_thickness_m, l.previous_start_sd_m, l.gap_m) = (1, 0.02, 5e-4, 0.003);
     (l.rupture_m, l.start_m) = (0.005, 0.008);
     stylet.passed_layers[0] = [-0.015, 0.008, 8000.0];

@@ -196,7 +196,10 @@ fn a_spike_of_up_to_three_samples_is_ignored_and_a_lasting_jump_restarts_the_pre
             assert_eq!((stylet.predictor.level_n(), stylet.operations), (1.5, 158 * u32::from(spikes)));
             assert_same(&stylet.estimator.belief, &was);
         }
-        let found = after(stylet, force_n);
+        // Where the force does not follow the base law, it restarts the predictor.
+        let mut rough = stylet;
+        rough.base_law_failed = true;
+        let found = after(rough, force_n);
         assert_eq!((found.spike_samples, found.predictor.level_n(), found.roughness), (0, force_n, texture));
         // Slope scale: the whole force less the bias over a millimetre.
         let scale_n = (force_n - 0.07_f64).abs().max(0.04);
@@ -207,6 +210,13 @@ fn a_spike_of_up_to_three_samples_is_ignored_and_a_lasting_jump_restarts_the_pre
                 && found.output.detection.is_none()
                 && found.cusum.relative_level() == 0.0
         );
+        // Where it does, the zero has jumped, and everything else stays.
+        let found = after(stylet, force_n);
+        let step = found.output.zero_step.expect("a step of the zero");
+        assert!((step.size_n - (force_n - 1.5)).abs() < 1e-9 && step.in_tissue && step.withdrawn.is_none());
+        assert_eq!((found.spike_samples, found.predictor.level_n(), found.roughness), (0, 1.5, texture));
+        assert_eq!(found.estimator.belief.x, was.x);
+        assert_eq!(found.baseline.subtracted_n(0.0, 0.0), step.size_n);
         // An ordinary sample ends the spike.
         assert_eq!(after(stylet, 1.5).spike_samples, 0);
     }
@@ -348,7 +358,7 @@ fn a_free_tip_is_tested_after_the_end_of_a_drop() {
             (1, 103, 0.02);
         stylet.estimator.layer_confirmed = false;
         stylet.post_rupture = drop_goes_on.then_some(stylet.estimator);
-        stylet.estimator.belief = Gaussian::new([100.0, 60.0, 9000.0, 25.0, 8e3, 0.5], [1.0; 6]);
+        stylet.estimator.belief = Gaussian::new([100.0, 60.0, 9000.0, 25.0, 8e3, 0.5, 0.0, 0.0], [1.0; 8]);
         assert_eq!(after(stylet, 1.48).operations, 158 + 136 + looked);
     }
 }
@@ -422,7 +432,7 @@ fn reports_come_after_twice_as_many_samples_each() {
         let mut stylet = inside();
         (stylet.estimator.passed_count, stylet.estimator.previous_thickness_m, stylet.output.ruptures) =
             (1, 0.02, 1);
-        stylet.estimator.belief = Gaussian::new([100.0, 60.0, 9000.0, 25.0, 8e3, 0.07], [1.0; 6]);
+        stylet.estimator.belief = Gaussian::new([100.0, 60.0, 9000.0, 25.0, 8e3, 0.07, 0.0, 0.0], [1.0; 8]);
         (stylet.samples_since_rupture, stylet.next_report_at) = (since, 16);
         let found = after(stylet, 1.48);
         assert_eq!((found.output.estimate.is_some(), found.next_report_at), (reported, next));

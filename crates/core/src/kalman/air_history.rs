@@ -1,0 +1,736 @@
+//! What the sensor reads in air: an offset that may drift in time, change with position (a cable, a guide, the weight of a
+//! tilted tool) or jump (the zero was set). A contact is a *bend* of the force that none of these explains.
+//!
+//! The samples since the start are kept as block averages of growing length: eight single samples, then four blocks of two,
+//! of four, and so on, and a dozen equally long ones for everything older. [`AirHistory::evaluate`] compares,
+//! by the Bayesian information criterion, the baselines
+//!
+//! ```text
+//! f = c,   f = c + d t,   f = c + g z
+//! ```
+//!
+//! each alone, with a step of the zero at any block, and with a bend `s (z - z_c)` from any block on. The noise of a block
+//! average follows from that of the differences of neighbouring samples, which no baseline changes; where even the best
+//! hypothesis leaves more than that, all evidence is divided by the excess.
+
+use super::gaussian::at_least;
+use crate::sample::{BaselineKind, Sample};
+
+/// Blocks of one length, and of the last length, an odd number.
+const LEVEL_BLOCKS: usize = 4;
+const LAST_LEVEL_BLOCKS: usize = 11;
+/// Lengths of blocks: 1, 1, 2, 4, 8, and as long as necessary.
+const LEVELS: usize = 6;
+/// All blocks, one per level in transit.
+const MAX_BLOCKS: usize = (LEVELS - 1) * (LEVEL_BLOCKS + 1) + LAST_LEVEL_BLOCKS + 2;
+/// Log odds against a baseline that moves before any data: every second recording.
+const MOVING_PRIOR_NATS: f64 = 0.7;
+/// Log odds against a step of the zero: one recording in ten.
+const STEP_PRIOR_NATS: f64 = 2.3;
+/// Standard deviations beyond which a sample between two others is a spike of the log.
+const SPIKE_SDS: f64 = 6.0;
+/// Differences before they are limited.
+const MIN_DIFFERENCES: f64 = 5.0;
+/// Largest squared difference, in multiples of the mean, that informs the noise: a step is none.
+const MAX_SQUARED_DIFFERENCE: f64 = 16.0;
+/// Largest noise correlation from sample to sample.
+const MAX_RHO: f64 = 0.98;
+/// Differences of samples that many apart inform a correlation above [`LONG_LAG_FROM`], solved for to `2^-BISECTIONS`.
+const LONG_LAG: usize = 8;
+const LONG_LAG_FROM: f64 = 0.5;
+const BISECTIONS: u32 = 12;
+/// Independent samples from which a baseline that moves is known.
+const MIN_INDEPENDENT: f64 = 20.0;
+/// Squared correlation of time and position above which drift and line are one.
+const INSEPARABLE: f64 = 0.99;
+/// Log odds between drift and line that name one of them.
+const NAMING_NATS: f64 = 3.0;
+/// Smallest step of the zero that is one, in standard deviations of the noise: it stands out between two samples.
+const MIN_STEP_SDS: f64 = 5.0;
+/// Longest blocks between which a step is searched, in samples, and the share of the step that has to lie between them: longer
+/// ones do not tell a step from a ramp.
+const MAX_JUMP_SAMPLES: f64 = 2.0;
+pub(super) const MIN_JUMP_SHARE: f64 = 0.6;
+/// Share of a regressor's square that projection must leave.
+const MIN_REMAINING_SHARE: f64 = 1e-9;
+/// Multiplications and additions of an evaluation per block.
+const OPERATIONS_PER_BLOCK: u32 = 85;
+/// Of a fit.
+const OPERATIONS_PER_FIT: u32 = 90;
+
+/// Averages of `count` samples.
+#[derive(Clone, Copy, Debug, Default)]
+struct Block {
+    count: f64,
+    time_s: f64,
+    position_m: f64,
+    force_n: f64,
+}
+
+impl Block {
+    fn merged(&self, other: &Block) -> Block {
+        let count = self.count + other.count;
+        let share = if count > 0.0 { other.count / count } else { 0.5 };
+        let mix = |a: f64, b: f64| a + share * (b - a);
+        Block {
+            count,
+            time_s: mix(self.time_s, other.time_s),
+            position_m: mix(self.position_m, other.position_m),
+            force_n: mix(self.force_n, other.force_n),
+        }
+    }
+}
+
+/// Form of a baseline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Form {
+    Constant,
+    Drift,
+    Line,
+}
+
+/// A hypothesis: the form of the baseline, and the block at which a step or a bend begins.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Hypothesis {
+    pub(super) form: Form,
+    /// Log evidence in nats, up to a constant common to all.
+    pub(super) nats: f64,
+    /// First block of the event.
+    pub(super) from: usize,
+    /// Size of the step in N, or slope of the bend in N/m.
+    pub(super) size: f64,
+    /// Sums over the blocks of the event.
+    sums: Suffix,
+}
+
+impl Hypothesis {
+    fn none() -> Self {
+        Self { form: Form::Constant, nats: f64::NEG_INFINITY, from: 0, size: 0.0, sums: Suffix::default() }
+    }
+
+    fn improve(&mut self, other: Hypothesis) {
+        if other.nats > self.nats {
+            *self = other;
+        }
+    }
+}
+
+/// The best hypothesis of each kind.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct AirEvidence {
+    /// No event.
+    pub(super) quiet: Hypothesis,
+    /// A step of the zero.
+    pub(super) step: Hypothesis,
+    /// A bend: contact.
+    pub(super) bend: Hypothesis,
+    /// No event, with a constant offset.
+    pub(super) constant_nats: f64,
+    /// Excess of the block variance over that of the noise, 1 or more.
+    pub(super) excess: f64,
+    total: Totals,
+    sample_weight: f64,
+}
+
+impl AirEvidence {
+    /// Variance in N² of the mean of the samples of an event.
+    pub(super) fn event_variance(&self, event: &Hypothesis) -> f64 {
+        self.excess / at_least(1e-300, event.sums.n)
+    }
+
+    /// Log odds of a contact against everything else.
+    pub(super) fn contact_nats(&self) -> f64 {
+        self.bend.nats - self.quiet.nats.max(self.step.nats)
+    }
+
+    /// Log odds of a step of the zero against everything else.
+    pub(super) fn step_nats(&self) -> f64 {
+        self.step.nats - self.quiet.nats.max(self.bend.nats)
+    }
+}
+
+/// A baseline fitted to the samples in air. Level, drift and line belong to `time_s`, `position_m`.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct BaselineFit {
+    pub(crate) time_s: f64,
+    pub(crate) position_m: f64,
+    /// Level in N, drift in N/s, slope with position in N/m.
+    pub(crate) x: [f64; 3],
+    /// Their covariance.
+    pub(crate) p: [[f64; 3]; 3],
+    pub(crate) kind: BaselineKind,
+    /// Samples that the fit rests on.
+    pub(crate) samples: f64,
+}
+
+impl BaselineFit {
+    /// The same baseline referred to another time and place.
+    pub(super) fn at(&self, time_s: f64, position_m: f64) -> Self {
+        let (dt, dz) = (time_s - self.time_s, position_m - self.position_m);
+        let mut out = Self { time_s, position_m, ..*self };
+        out.x[0] += dt * self.x[1] + dz * self.x[2];
+        out.p[0][0] = self.level_variance(dt, dz);
+        for k in 1..3 {
+            out.p[0][k] = self.p[0][k] + dt * self.p[1][k] + dz * self.p[2][k];
+            out.p[k][0] = out.p[0][k];
+        }
+        out
+    }
+
+    /// Variance in N² of the level after `dt_s` and `dz_m`.
+    pub(crate) fn level_variance(&self, dt_s: f64, dz_m: f64) -> f64 {
+        let p = &self.p;
+        at_least(
+            0.0,
+            p[0][0]
+                + dt_s * (2.0 * p[0][1] + dt_s * p[1][1])
+                + dz_m * (2.0 * p[0][2] + dz_m * p[2][2])
+                + 2.0 * dt_s * dz_m * p[1][2],
+        )
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AirHistory {
+    blocks: [[Block; LAST_LEVEL_BLOCKS + 1]; LEVELS],
+    filled: [usize; LEVELS],
+    /// Samples per block of the last level.
+    last_unit: f64,
+    origin: Sample,
+    /// Samples taken.
+    pub(super) samples: f64,
+    /// The last two samples; the last one waits to be seen between two others.
+    before: [Block; 2],
+    /// Mean squared differences in N² of samples one, two and [`LONG_LAG`] apart, and their numbers.
+    differences: [f64; 3],
+    difference_counts: [f64; 3],
+    /// The last forces in N, of which the next one overwrites the oldest.
+    recent_n: [f64; LONG_LAG],
+    /// Lower bound on the variance of the noise in N².
+    least_n2: f64,
+}
+
+/// Blocks in the order of time, and where a step or a bend may begin.
+struct Ordered {
+    blocks: [Block; MAX_BLOCKS],
+    len: usize,
+}
+
+impl AirHistory {
+    /// The noise has at least the variance `least_n2`.
+    pub(super) fn new(least_n2: f64) -> Self {
+        Self {
+            blocks: [[Block::default(); LAST_LEVEL_BLOCKS + 1]; LEVELS],
+            filled: [0; LEVELS],
+            last_unit: 16.0,
+            origin: Sample::default(),
+            samples: 0.0,
+            before: [Block::default(); 2],
+            differences: [0.0; 3],
+            difference_counts: [0.0; 3],
+            recent_n: [0.0; LONG_LAG],
+            least_n2,
+        }
+    }
+
+    /// Takes a sample.
+    pub(super) fn push(&mut self, sample: &Sample) {
+        if self.samples == 0.0 {
+            self.origin = *sample;
+        }
+        let new = Block {
+            count: 1.0,
+            time_s: sample.time_s - self.origin.time_s,
+            position_m: sample.position_m - self.origin.position_m,
+            force_n: sample.force_n - self.origin.force_n,
+        };
+        let slot = self.samples as usize % LONG_LAG;
+        if self.samples >= LONG_LAG as f64 {
+            self.difference(2, new.force_n - self.recent_n[slot]);
+        }
+        self.recent_n[slot] = new.force_n;
+        self.samples += 1.0;
+        let [older, mut last] = self.before;
+        if last.count > 0.0 {
+            self.difference(0, new.force_n - last.force_n);
+        }
+        if older.count > 0.0 {
+            self.difference(1, new.force_n - older.force_n);
+            let median = older.force_n.max(new.force_n).min(last.force_n.max(older.force_n.min(new.force_n)));
+            let off = last.force_n - median;
+            if off * off > SPIKE_SDS * SPIKE_SDS * 0.5 * self.differences[0].max(self.least_n2)
+                && self.samples > 40.0
+            {
+                last.force_n = median;
+            }
+        }
+        if last.count > 0.0 {
+            self.insert(last);
+        }
+        self.before = [last, new];
+    }
+
+    fn difference(&mut self, lag: usize, step: f64) {
+        let mut square = step * step;
+        let (count, mean) = (self.difference_counts[lag], self.differences[lag]);
+        if count > MIN_DIFFERENCES {
+            square = square.min(MAX_SQUARED_DIFFERENCE * mean.max(self.least_n2));
+        }
+        self.difference_counts[lag] += 1.0;
+        self.differences[lag] += (square - mean) / (count + 1.0);
+    }
+
+    fn insert(&mut self, mut block: Block) {
+        for level in 0..LEVELS {
+            let filled = self.filled[level];
+            if level + 1 == LEVELS
+                && let Some(newest) = filled.checked_sub(1)
+                && self.blocks[level][newest].count < self.last_unit
+            {
+                self.blocks[level][newest] = self.blocks[level][newest].merged(&block);
+                return;
+            }
+            self.blocks[level][filled] = block;
+            self.filled[level] = filled + 1;
+            let most = if level + 1 == LEVELS { LAST_LEVEL_BLOCKS } else { LEVEL_BLOCKS };
+            if filled < most {
+                return;
+            }
+            if level + 1 == LEVELS {
+                // All become longer.
+                for pair in 0..(LAST_LEVEL_BLOCKS + 1) / 2 {
+                    let [first, second] = [self.blocks[level][2 * pair], self.blocks[level][2 * pair + 1]];
+                    self.blocks[level][pair] = first.merged(&second);
+                }
+                self.filled[level] = (LAST_LEVEL_BLOCKS + 1) / 2;
+                self.last_unit *= 2.0;
+                return;
+            }
+            // The first level passes single samples on.
+            let taken = if level == 0 { 1 } else { 2 };
+            block = self.blocks[level][0];
+            if taken == 2 {
+                block = block.merged(&self.blocks[level][1]);
+            }
+            for i in taken..=LEVEL_BLOCKS {
+                self.blocks[level][i - taken] = self.blocks[level][i];
+            }
+            self.filled[level] = LEVEL_BLOCKS + 1 - taken;
+        }
+    }
+
+    /// Correlation of the noise from sample to sample. Half the mean squared differences are the variance times `1 - rho^lag`.
+    pub(super) fn rho(&self) -> f64 {
+        let [near, far, farthest] = self.differences;
+        if near <= 0.0 {
+            return 0.0;
+        }
+        let rho = far / near - 1.0;
+        if rho > LONG_LAG_FROM && farthest > 0.0 {
+            // Slow noise hardly changes over two samples: 1 + rho + ... + rho^7 by bisection.
+            let (mut low, mut high) = (0.0, MAX_RHO);
+            for _ in 0..BISECTIONS {
+                let middle = 0.5 * (low + high);
+                let mut sum = 0.0;
+                for _ in 0..LONG_LAG {
+                    sum = 1.0 + middle * sum;
+                }
+                if sum * near < farthest {
+                    low = middle;
+                } else {
+                    high = middle;
+                }
+            }
+            return 0.5 * (low + high);
+        }
+        if rho <= 0.0 || rho * rho * self.difference_counts[0] < 4.0 { 0.0 } else { rho.min(MAX_RHO) }
+    }
+
+    /// Variance of the noise in N².
+    pub(super) fn noise_variance(&self) -> f64 {
+        (0.5 * self.differences[0] / (1.0 - self.rho())).max(self.least_n2)
+    }
+
+    /// Information in a sample about anything slow, in N⁻².
+    fn sample_weight(&self) -> f64 {
+        let rho = self.rho();
+        (1.0 - rho) / ((1.0 + rho) * self.noise_variance())
+    }
+
+    fn ordered(&self) -> Ordered {
+        let mut out = Ordered { blocks: [Block::default(); MAX_BLOCKS], len: 0 };
+        let last = core::iter::once(&self.before[1]).filter(|b| b.count > 0.0);
+        let older =
+            self.blocks.iter().zip(self.filled).rev().flat_map(|(level, filled)| level[..filled].iter());
+        for block in older.filter(|b| b.count > 0.0).chain(last) {
+            if let Some(slot) = out.blocks.get_mut(out.len) {
+                *slot = *block;
+                out.len += 1;
+            }
+        }
+        out
+    }
+
+    /// Multiplications and additions of an evaluation.
+    pub(super) fn evaluation_operations(&self) -> u32 {
+        OPERATIONS_PER_BLOCK * self.filled.iter().sum::<usize>() as u32 + OPERATIONS_PER_FIT
+    }
+
+    /// Compares all hypotheses.
+    pub(super) fn evaluate(&self) -> AirEvidence {
+        let ordered = self.ordered();
+        let blocks = &ordered.blocks[..ordered.len];
+        let sample_weight = self.sample_weight();
+        let total = Totals::new(blocks, sample_weight);
+        let n = at_least(2.0, self.samples);
+        let half_log_n = 0.5 * libm::log(n);
+        let moving = half_log_n + MOVING_PRIOR_NATS;
+        // Of the baselines that move, the better one.
+        let line = total.residual(Form::Line) < total.residual(Form::Drift);
+        let forms = [(Form::Constant, 0.0), (if line { Form::Line } else { Form::Drift }, moving)];
+        let residual = |form: Form| total.residual(form);
+        let (mut step, mut bend) = ([Hypothesis::none(); 2], [Hypothesis::none(); 2]);
+        let mut sums = Suffix::default();
+        let variance = self.noise_variance();
+        let least_step_n2 = MIN_STEP_SDS * MIN_STEP_SDS * variance;
+        for (j, block) in blocks.iter().enumerate().skip(2).rev() {
+            sums.add(block, sample_weight, &total);
+            let onset = blocks[j - 1].position_m - total.position_m;
+            let (before, jump_n) = (&blocks[j - 1], block.force_n - blocks[j - 1].force_n);
+            let recent = before.count <= MAX_JUMP_SAMPLES && block.count <= MAX_JUMP_SAMPLES;
+            for (k, (form, _)) in forms.iter().enumerate() {
+                if recent
+                    && let Some((gain, size)) = sums.step_gain(*form, &total)
+                    && size * size > least_step_n2
+                    && jump_n * size > MIN_JUMP_SHARE * size * size
+                {
+                    step[k].improve(Hypothesis { form: *form, nats: 0.5 * gain, from: j, size, sums });
+                }
+                let independent = (total.weight - sums.n) * variance;
+                if let Some((gain, size)) = sums.bend_gain(*form, &total, onset)
+                    && size > 0.0
+                    && (k == 0 || independent > MIN_INDEPENDENT)
+                {
+                    bend[k].improve(Hypothesis { form: *form, nats: 0.5 * gain, from: j, size, sums });
+                }
+            }
+        }
+        // What even the best hypothesis leaves is noise.
+        let mut least = f64::INFINITY;
+        for (k, (form, _)) in forms.iter().enumerate() {
+            let gain = 2.0 * step[k].nats.max(bend[k].nats).max(0.0);
+            least = least.min(residual(*form) - gain);
+        }
+        let excess = (least / (blocks.len() as f64 - 4.0).max(1.0)).max(1.0);
+        let (mut out, event) = (
+            AirEvidence {
+                quiet: Hypothesis::none(),
+                step: Hypothesis::none(),
+                bend: Hypothesis::none(),
+                constant_nats: -0.5 * residual(Form::Constant) / excess,
+                excess,
+                total,
+                sample_weight,
+            },
+            2.0 * half_log_n,
+        );
+        for (k, (form, penalty)) in forms.into_iter().enumerate() {
+            let base = -0.5 * residual(form) / excess - penalty;
+            if form != Form::Constant && total.weight * variance < MIN_INDEPENDENT {
+                continue;
+            }
+            out.quiet.improve(Hypothesis { form, nats: base, from: blocks.len(), ..Hypothesis::none() });
+            out.step.improve(Hypothesis {
+                nats: base + step[k].nats / excess - event - STEP_PRIOR_NATS,
+                ..step[k]
+            });
+            out.bend.improve(Hypothesis { nats: base + bend[k].nats / excess - event, ..bend[k] });
+        }
+        out
+    }
+
+    /// Time and position of the last sample before block `from`.
+    pub(super) fn onset(&self, from: usize) -> (f64, f64) {
+        let ordered = self.ordered();
+        let at = ordered.blocks[..ordered.len].get(from.saturating_sub(1)).copied().unwrap_or_default();
+        (at.time_s + self.origin.time_s, at.position_m + self.origin.position_m)
+    }
+
+    /// The zero jumped by `size_n` with the last `count` samples.
+    pub(super) fn absorb_last_samples(&mut self, count: usize, size_n: f64) {
+        self.absorb_step(self.ordered().len.saturating_sub(count), size_n);
+    }
+
+    /// The zero jumped by `size_n` at block `from`: what came before is moved to the new zero.
+    pub(super) fn absorb_step(&mut self, from: usize, size_n: f64) {
+        let mut index = 0;
+        for level in (0..LEVELS).rev() {
+            for block in &mut self.blocks[level][..self.filled[level]] {
+                if block.count == 0.0 {
+                    continue;
+                }
+                if index < from {
+                    block.force_n += size_n;
+                }
+                // A block that holds both levels is worthless.
+                if block.count > 1.0 && (index == from || index + 1 == from) {
+                    block.count = 0.0;
+                }
+                index += 1;
+            }
+        }
+    }
+
+    /// The baseline of all blocks, referred to a time and place.
+    pub(super) fn quiet_fit(&self, evidence: &AirEvidence, at: &Sample) -> BaselineFit {
+        self.fit(evidence, &evidence.total, evidence.quiet.form, at)
+    }
+
+    /// The baseline of the blocks before a bend.
+    pub(super) fn fit_before_bend(&self, evidence: &AirEvidence, at: &Sample) -> BaselineFit {
+        self.fit(evidence, &evidence.total.before(&evidence.bend.sums), evidence.bend.form, at)
+    }
+
+    /// The baseline behind a step, whose level is known from the samples behind it alone.
+    pub(super) fn fit_behind_step(&self, evidence: &AirEvidence, at: &Sample) -> BaselineFit {
+        let step = &evidence.step;
+        let mut fit = self.fit(evidence, &evidence.total.without_step(&step.sums, step.size), step.form, at);
+        fit.p[0][0] = at_least(fit.p[0][0], evidence.excess / at_least(1e-300, step.sums.n));
+        fit
+    }
+
+    /// Drift and line are estimated together, each with a prior of the size of the whole change, so that motion at one speed
+    /// leaves half of it to each.
+    fn fit(&self, evidence: &AirEvidence, total: &Totals, form: Form, at: &Sample) -> BaselineFit {
+        // Sums in units of the noise variance with its excess.
+        let scale = 1.0 / evidence.excess;
+        let total = &total.scaled(scale);
+        let samples = total.weight / (scale * evidence.sample_weight);
+        let centre = (total.time_s + self.origin.time_s, total.position_m + self.origin.position_m);
+        let (dt, dz) = (at.time_s - centre.0, at.position_m - centre.1);
+        let level = total.force_n + self.origin.force_n;
+        let mut fit =
+            BaselineFit { time_s: at.time_s, position_m: at.position_m, samples, ..BaselineFit::default() };
+        fit.p[0][0] = 1.0 / at_least(1e-300, total.weight);
+        fit.x[0] = level;
+        if form == Form::Constant || total.tt <= 0.0 {
+            return fit;
+        }
+        let travels = total.zz > MIN_REMAINING_SHARE * total.tt;
+        let rate = if form == Form::Drift { total.tf / total.tt } else { total.zf / total.zz };
+        let speed = libm::sqrt(total.zz / total.tt);
+        let (rate_s, rate_m) = if form == Form::Drift { (rate, rate / speed) } else { (rate * speed, rate) };
+        let squared = |x: f64| 1.0 / at_least(1e-300, x * x);
+        let (pd, pl) = (squared(rate_s), squared(rate_m));
+        let (a, c) = (total.tt + pd, total.zz + pl);
+        let b = total.tz;
+        let (drift, line, p11, p12, p22) = if travels && (a * c - b * b) > 0.0 {
+            let det = a * c - b * b;
+            let drift = (c * total.tf - b * total.zf) / det;
+            let line = (a * total.zf - b * total.tf) / det;
+            (drift, line, c / det, -b / det, a / det)
+        } else {
+            (total.tf / a, 0.0, 1.0 / a, 0.0, 0.0)
+        };
+        fit.x = [level + drift * dt + line * dz, drift, line];
+        // From the centre to the reference.
+        let p01 = dt * p11 + dz * p12;
+        let p02 = dt * p12 + dz * p22;
+        fit.p = [[fit.p[0][0] + dt * p01 + dz * p02, p01, p02], [p01, p11, p12], [p02, p12, p22]];
+        let r2 = total.tz * total.tz / at_least(1e-300, total.tt * total.zz);
+        let gain = |form| -0.5 * total.residual(form);
+        let difference = gain(Form::Drift) - gain(Form::Line);
+        fit.kind = if !travels {
+            BaselineKind::Drift
+        } else if r2 > INSEPARABLE || difference.abs() < NAMING_NATS {
+            BaselineKind::DriftOrLine
+        } else if difference > 0.0 {
+            BaselineKind::Drift
+        } else {
+            BaselineKind::Line
+        };
+        fit
+    }
+}
+
+/// Weighted sums over blocks, about their means.
+#[derive(Clone, Copy, Debug)]
+struct Totals {
+    weight: f64,
+    time_s: f64,
+    position_m: f64,
+    force_n: f64,
+    tt: f64,
+    zz: f64,
+    tz: f64,
+    tf: f64,
+    zf: f64,
+    ff: f64,
+}
+
+impl Totals {
+    fn new(blocks: &[Block], sample_weight: f64) -> Self {
+        let (mut w, mut t, mut z, mut f) = (0.0, 0.0, 0.0, 0.0);
+        for b in blocks {
+            let v = sample_weight * b.count;
+            (w, t, z, f) = (w + v, t + v * b.time_s, z + v * b.position_m, f + v * b.force_n);
+        }
+        let unit = 1.0 / at_least(1e-300, w);
+        let mut out = Self {
+            weight: w,
+            time_s: unit * t,
+            position_m: unit * z,
+            force_n: unit * f,
+            tt: 0.0,
+            zz: 0.0,
+            tz: 0.0,
+            tf: 0.0,
+            zf: 0.0,
+            ff: 0.0,
+        };
+        for b in blocks {
+            let v = sample_weight * b.count;
+            let (t, z, f) = (b.time_s - out.time_s, b.position_m - out.position_m, b.force_n - out.force_n);
+            (out.tt, out.zz, out.tz) = (out.tt + v * t * t, out.zz + v * z * z, out.tz + v * t * z);
+            (out.tf, out.zf, out.ff) = (out.tf + v * t * f, out.zf + v * z * f, out.ff + v * f * f);
+        }
+        out
+    }
+
+    fn scaled(&self, by: f64) -> Self {
+        Self {
+            weight: by * self.weight,
+            tt: by * self.tt,
+            zz: by * self.zz,
+            tz: by * self.tz,
+            tf: by * self.tf,
+            zf: by * self.zf,
+            ff: by * self.ff,
+            ..*self
+        }
+    }
+
+    /// Without the blocks of an event.
+    fn before(&self, event: &Suffix) -> Self {
+        let weight = self.weight - event.n;
+        let unit = 1.0 / at_least(1e-300, weight);
+        // Means of what remains, about those of all.
+        let (t, z, f) = (-unit * event.t, -unit * event.z, -unit * event.f);
+        Self {
+            weight,
+            time_s: self.time_s + t,
+            position_m: self.position_m + z,
+            force_n: self.force_n + f,
+            tt: at_least(0.0, self.tt - event.tt - weight * t * t),
+            zz: at_least(0.0, self.zz - event.zz - weight * z * z),
+            tz: self.tz - event.tz - weight * t * z,
+            tf: self.tf - event.tf - weight * t * f,
+            zf: self.zf - event.zf - weight * z * f,
+            ff: self.ff,
+        }
+    }
+
+    /// With the force before a step moved to the level behind it.
+    fn without_step(&self, event: &Suffix, size_n: f64) -> Self {
+        Self {
+            force_n: self.force_n + size_n * (1.0 - event.n / at_least(1e-300, self.weight)),
+            tf: self.tf - size_n * event.t,
+            zf: self.zf - size_n * event.z,
+            ..*self
+        }
+    }
+
+    /// Squared slope regressor and its product with the force.
+    fn slope(&self, form: Form) -> (f64, f64) {
+        match form {
+            Form::Constant => (0.0, 0.0),
+            Form::Drift => (self.tt, self.tf),
+            Form::Line => (self.zz, self.zf),
+        }
+    }
+
+    /// Sum of squares that the baseline leaves, in units of the noise variance.
+    fn residual(&self, form: Form) -> f64 {
+        let (square, product) = self.slope(form);
+        at_least(0.0, self.ff - if square > 0.0 { product * product / square } else { 0.0 })
+    }
+}
+
+/// Weighted sums over the last blocks, about the means of all.
+#[derive(Clone, Copy, Debug, Default)]
+struct Suffix {
+    n: f64,
+    t: f64,
+    z: f64,
+    f: f64,
+    tt: f64,
+    tz: f64,
+    zz: f64,
+    tf: f64,
+    zf: f64,
+}
+
+impl Suffix {
+    fn add(&mut self, block: &Block, sample_weight: f64, total: &Totals) {
+        let w = sample_weight * block.count;
+        let (t, z) = (block.time_s - total.time_s, block.position_m - total.position_m);
+        let (f, wz) = (block.force_n - total.force_n, w * z);
+        self.n += w;
+        let wt = w * t;
+        self.t += wt;
+        self.z += wz;
+        self.f += w * f;
+        self.tt += wt * t;
+        self.tf += wt * f;
+        self.tz += wz * t;
+        self.zz += wz * z;
+        self.zf += wz * f;
+    }
+
+    /// Reduction of the sum of squares by a step at the first of these blocks, and its size.
+    fn step_gain(&self, form: Form, total: &Totals) -> Option<(f64, f64)> {
+        let (square, product) = total.slope(form);
+        let along = match form {
+            Form::Constant => 0.0,
+            Form::Drift => self.t,
+            Form::Line => self.z,
+        };
+        remaining((self.n, self.f, self.n, along), total.weight, square, product)
+    }
+
+    /// As [`Suffix::step_gain`] for a bend at `onset`.
+    fn bend_gain(&self, form: Form, total: &Totals, onset: f64) -> Option<(f64, f64)> {
+        let (square, product) = total.slope(form);
+        let along = match form {
+            Form::Constant => 0.0,
+            Form::Drift => self.tz - onset * self.t,
+            Form::Line => self.zz - onset * self.z,
+        };
+        let own = self.zz - onset * (2.0 * self.z - onset * self.n);
+        remaining(
+            (own, self.zf - onset * self.f, self.z - onset * self.n, along),
+            total.weight,
+            square,
+            product,
+        )
+    }
+}
+
+/// Regression on a further regressor with the square `own`, the product `with` with the force, `mean` with one and `along` with
+/// the slope regressor.
+fn remaining(
+    (own, with, mean, along): (f64, f64, f64, f64),
+    weight: f64,
+    square: f64,
+    product: f64,
+) -> Option<(f64, f64)> {
+    let (mut s, mut y) = (own - mean * mean / weight, with);
+    if square > 0.0 {
+        s -= along * along / square;
+        y -= along * product / square;
+    }
+    (s > MIN_REMAINING_SHARE * own).then(|| (y * y / s, y / s))
+}
+
+#[cfg(test)]
+mod tests;
