@@ -3,7 +3,11 @@
 use crate::config::{Algorithm, EnhanceConfig};
 use crate::kalman::KalmanEnhancer;
 use crate::paper::PaperEnhancer;
-use crate::sample::{Output, Sample};
+use crate::sample::{Output, Sample, UnusedReason};
+use crate::sample_clock::{SampleClock, Verdict};
+
+/// Samples that are checked ahead of the algorithm in [`Enhancer::run`].
+const BLOCK_SAMPLES: usize = 64;
 
 /// The online core: [`Enhancer::step`] is called once per sample.
 ///
@@ -18,6 +22,7 @@ use crate::sample::{Output, Sample};
 pub struct Enhancer<B> {
     paper: PaperEnhancer<B>,
     kalman: Option<KalmanEnhancer>,
+    clock: SampleClock,
     surface_m: f64,
 }
 
@@ -27,7 +32,12 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     pub fn new(config: EnhanceConfig, surface_m: f64, storage: B) -> Self {
         let kalman =
             (config.active_algorithm() == Algorithm::Stylet).then(|| KalmanEnhancer::new(&config, surface_m));
-        Self { paper: PaperEnhancer::new(config, surface_m, storage), kalman, surface_m }
+        Self {
+            paper: PaperEnhancer::new(config, surface_m, storage),
+            kalman,
+            clock: SampleClock::default(),
+            surface_m,
+        }
     }
 
     /// The active configuration.
@@ -37,25 +47,39 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// Processes one sample. A sample that is not finite, out of range, or not later than the previous one is ignored
-    /// ([`Output::used`] is false).
+    /// ([`Output::used`] is false, [`Output::unused_reason`] says why).
+    ///
+    /// So is a sample whose time jumps: by a second back or more, or by more than a second ahead. When five samples in a row
+    /// continue such a jump, it is a pause (of up to ten minutes ahead), which the algorithm takes like a long interval, or a new
+    /// clock, at which it is re-initialised ([`Output::restarted`]). A single wrong time stamp has no effect.
     #[inline]
     pub fn step(&mut self, sample: Sample) -> Output {
+        self.step_brief(sample);
         match &mut self.kalman {
-            Some(kalman) => {
-                kalman.step(self.paper.config(), self.surface_m, sample);
-                *kalman.complete_output(&sample)
-            }
-            None => self.paper.step(sample),
+            Some(kalman) => *kalman.complete_output(&sample),
+            None => *self.paper.complete_output(&sample),
         }
     }
 
     /// As [`Enhancer::step`] without a copy of the output, of which only enhanced force, innovation, state, ruptures, contact,
-    /// detection, estimate and `used` are updated.
+    /// detection, estimate, `used`, `unused_reason` and `restarted` are updated.
     #[inline]
     pub fn step_brief(&mut self, sample: Sample) -> &Output {
-        match &mut self.kalman {
-            Some(kalman) => kalman.step(self.paper.config(), self.surface_m, sample),
-            None => self.paper.step_brief(sample),
+        let before_s = self.clock.last_s();
+        match self.check(&sample) {
+            Verdict::Ignore(why) => self.ignore(why),
+            Verdict::Restart => self.restart(sample),
+            Verdict::Use => {
+                let out = match &mut self.kalman {
+                    Some(kalman) => kalman.step(self.paper.config(), self.surface_m, sample),
+                    None => self.paper.step_brief(sample),
+                };
+                if !out.used {
+                    // The algorithm refuses samples that are almost simultaneous; the clock must not count them.
+                    self.clock.revert_to(before_s);
+                }
+                out
+            }
         }
     }
 
@@ -63,14 +87,63 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     /// sample and returns the last one.
     #[inline]
     pub fn run(&mut self, samples: &[Sample], mut each: impl FnMut(&Output)) -> &Output {
+        if self.kalman.is_some() {
+            for sample in samples {
+                each(self.step_brief(*sample));
+            }
+            return self.output();
+        }
+        for block in samples.chunks(BLOCK_SAMPLES) {
+            let mut clock = self.clock;
+            if block.iter().all(|s| s.is_usable() && clock.check(s.time_s) == Verdict::Use) {
+                self.clock = clock;
+                self.paper.run(block, &mut each);
+            } else {
+                for sample in block {
+                    each(self.step_brief(*sample));
+                }
+            }
+        }
+        self.output()
+    }
+
+    #[inline(always)]
+    fn check(&mut self, sample: &Sample) -> Verdict {
+        let usable = match &self.kalman {
+            Some(_) => KalmanEnhancer::is_usable(sample),
+            None => sample.is_usable(),
+        };
+        if usable { self.clock.check(sample.time_s) } else { Verdict::Ignore(UnusedReason::of_values(sample)) }
+    }
+
+    #[cold]
+    fn ignore(&mut self, why: UnusedReason) -> &Output {
+        match &mut self.kalman {
+            Some(kalman) => kalman.ignore(why),
+            None => self.paper.ignore(why),
+        }
+    }
+
+    #[cold]
+    fn restart(&mut self, sample: Sample) -> &Output {
         match &mut self.kalman {
             Some(kalman) => {
-                for sample in samples {
-                    each(kalman.step(self.paper.config(), self.surface_m, *sample));
-                }
-                kalman.output()
+                *kalman = KalmanEnhancer::new(self.paper.config(), self.surface_m);
+                kalman.step(self.paper.config(), self.surface_m, sample);
+                kalman.mark_restarted()
             }
-            None => self.paper.run(samples, each),
+            None => {
+                self.paper.restart(self.surface_m);
+                self.paper.step_brief(sample);
+                self.paper.mark_restarted()
+            }
+        }
+    }
+
+    fn output(&self) -> &Output {
+        match &self.kalman {
+            Some(kalman) => kalman.output(),
+            None => self.paper.output(),
         }
     }
 

@@ -25,13 +25,15 @@ mod enhancer;
 mod kalman;
 mod paper;
 mod sample;
+mod sample_clock;
 
 pub use config::EnhanceConfig;
 pub use enhancer::Enhancer;
 pub use paper::rls::Rls;
 pub use paper::state_machine::{TRANSITIONS, Transition, Trigger};
 pub use sample::{
-    Baseline, BaselineKind, Cause, Detection, LayerEstimate, MAX_LAYERS, Output, Sample, State, ZeroStep,
+    Baseline, BaselineKind, Cause, Detection, LayerEstimate, MAX_LAYERS, Output, Sample, State, UnusedReason,
+    ZeroStep,
 };
 
 /// The example of the README.

@@ -33,6 +33,41 @@ impl Sample {
     }
 }
 
+/// Why a sample was not used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
+pub enum UnusedReason {
+    /// A value is NaN or infinite.
+    NotFinite,
+    /// Position, velocity or force is physically impossible for a needle.
+    OutOfRange,
+    /// The time is not later than that of the last used sample.
+    NotLater,
+    /// The time jumped; further samples decide whether it is an outlier, a pause or a new clock.
+    TimeJump,
+}
+
+impl UnusedReason {
+    /// One sentence without a full stop.
+    #[must_use]
+    pub fn message(self) -> &'static str {
+        match self {
+            UnusedReason::NotFinite => "a value is not finite",
+            UnusedReason::OutOfRange => "position, velocity or force is out of range",
+            UnusedReason::NotLater => "the time is not later than that of the last used sample",
+            UnusedReason::TimeJump => "the time jumped: an outlier, or the first samples of a new clock",
+        }
+    }
+
+    /// Why a sample that is not usable is not.
+    #[cold]
+    pub(crate) fn of_values(sample: &Sample) -> Self {
+        let finite = [sample.time_s, sample.position_m, sample.velocity_mps, sample.force_n];
+        if finite.iter().all(|x| x.is_finite()) { UnusedReason::OutOfRange } else { UnusedReason::NotFinite }
+    }
+}
+
 /// The states of the supplement's Fig. 1, and one of `Stylet`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
@@ -261,6 +296,22 @@ pub struct Output {
     pub detection: Option<Detection>,
     /// Layer estimate that became available at this sample.
     pub estimate: Option<LayerEstimate>,
-    /// False when the sample was ignored; the other fields then repeat the previous output.
+    /// False when the sample was ignored; the other fields then repeat the previous output and are not current.
     pub used: bool,
+    /// Why it was ignored; `None` when it was used.
+    pub unused_reason: Option<UnusedReason>,
+    /// The algorithm was re-initialised before this sample, because its time belongs to a new clock: ruptures, contact and
+    /// estimates begin again.
+    pub restarted: bool,
+}
+
+impl Output {
+    /// The output for an ignored sample: the values of the previous one, without its events.
+    pub(crate) fn ignore(&mut self, why: UnusedReason) {
+        self.detection = None;
+        self.estimate = None;
+        self.restarted = false;
+        self.used = false;
+        self.unused_reason = Some(why);
+    }
 }

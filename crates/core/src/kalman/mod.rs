@@ -26,7 +26,7 @@ mod test_support;
 mod tests;
 
 use crate::config::EnhanceConfig;
-use crate::sample::{Output, Sample};
+use crate::sample::{Output, Sample, UnusedReason};
 pub(crate) use state::KalmanEnhancer;
 
 /// Multiplications and additions of every sample outside the filters.
@@ -40,21 +40,40 @@ const MIN_DUPLICATE_INTERVAL_S: f64 = 1e-6;
 const MAX_DUPLICATE_INTERVAL_S: f64 = 1e-4;
 
 impl KalmanEnhancer {
+    /// Values that a needle can have; speed and position limits are tighter than those of [`Sample::is_usable`].
+    #[inline(always)]
+    pub(crate) fn is_usable(sample: &Sample) -> bool {
+        let in_range = sample.velocity_mps.abs() < MAX_SPEED_MPS && sample.position_m.abs() < MAX_POSITION_M;
+        sample.is_usable() && in_range
+    }
+
+    /// The output for an ignored sample.
+    #[cold]
+    pub(crate) fn ignore(&mut self, why: UnusedReason) -> &Output {
+        self.output.ignore(why);
+        self.operations = OPERATIONS_PER_SAMPLE;
+        &self.output
+    }
+
     #[inline]
     pub(crate) fn step(&mut self, config: &EnhanceConfig, surface_m: f64, sample: Sample) -> &Output {
         self.output.detection = None;
         self.output.estimate = None;
         self.output.zero_step = None;
+        self.output.restarted = false;
         self.operations = OPERATIONS_PER_SAMPLE;
-        let in_range = sample.velocity_mps.abs() < MAX_SPEED_MPS && sample.position_m.abs() < MAX_POSITION_M;
         // Two samples at almost the same time say nothing about the velocity.
         let min_interval_s = (DUPLICATE_INTERVAL_FRACTION * self.noise.interval_s)
             .clamp(MIN_DUPLICATE_INTERVAL_S, MAX_DUPLICATE_INTERVAL_S);
         let later = sample.time_s - self.last_sample.time_s > min_interval_s;
-        self.output.used = sample.is_usable() && in_range && (!self.started || later);
-        if !self.output.used {
-            return &self.output;
+        if !Self::is_usable(&sample) {
+            return self.ignore(UnusedReason::of_values(&sample));
         }
+        if self.started && !later {
+            return self.ignore(UnusedReason::NotLater);
+        }
+        self.output.used = true;
+        self.output.unused_reason = None;
         self.baseline.measured_n = sample.force_n;
         let subtracted_n = self.baseline.subtracted_n(sample.time_s, sample.position_m);
         let sample = Sample { force_n: sample.force_n - subtracted_n, ..sample };

@@ -191,4 +191,10 @@ impl KalmanEnhancer {
     pub(crate) fn output(&self) -> &Output {
         &self.output
     }
+
+    /// Marks the last sample as the first after a restart.
+    pub(crate) fn mark_restarted(&mut self) -> &Output {
+        self.output.restarted = true;
+        &self.output
+    }
 }

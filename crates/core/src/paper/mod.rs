@@ -14,7 +14,7 @@ mod sample_ring;
 pub(crate) mod state_machine;
 
 use crate::config::{Algorithm, Contact, CusumConfig, Depths, DropEstimator, EnhanceConfig, Model};
-use crate::sample::{Cause, Detection, LayerEstimate, Output, Sample, State};
+use crate::sample::{Cause, Detection, LayerEstimate, Output, Sample, State, UnusedReason};
 use contact_detection::{ContactDetector, ContactStatus};
 use force_drop::{ForceDrop, locate_drop};
 use friction_compensation::FrictionCompensation;
@@ -133,9 +133,69 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
         [self.config.prior_stiffness, self.config.prior_friction]
     }
 
+    /// Re-initialises everything but the configuration and the storage.
+    #[cold]
+    pub(crate) fn restart(&mut self, surface_m: f64) {
+        let PaperEnhancer {
+            config,
+            ring: _,
+            preprocessor,
+            contact,
+            compensation,
+            rls,
+            clock,
+            in_contact,
+            traversal,
+            pending,
+            cusum,
+            cusum_n2,
+            disabled_until,
+            zero_until,
+            waited_m,
+            waited_s,
+            settled_for_s,
+            out,
+        } = PaperEnhancer::<[Sample; 0]>::new(core::mem::take(&mut self.config), surface_m, []);
+        self.config = config;
+        self.ring.clear();
+        self.preprocessor = preprocessor;
+        self.contact = contact;
+        self.compensation = compensation;
+        self.rls = rls;
+        self.clock = clock;
+        self.in_contact = in_contact;
+        self.traversal = traversal;
+        self.pending = pending;
+        self.cusum = cusum;
+        self.cusum_n2 = cusum_n2;
+        self.disabled_until = disabled_until;
+        self.zero_until = zero_until;
+        self.waited_m = waited_m;
+        self.waited_s = waited_s;
+        self.settled_for_s = settled_for_s;
+        self.out = out;
+    }
+
+    pub(crate) fn output(&self) -> &Output {
+        &self.out
+    }
+
+    /// Marks the last sample as the first after a restart.
+    pub(crate) fn mark_restarted(&mut self) -> &Output {
+        self.out.restarted = true;
+        &self.out
+    }
+
+    /// The output for an ignored sample.
+    #[cold]
+    pub(crate) fn ignore(&mut self, why: UnusedReason) -> &Output {
+        self.out.ignore(why);
+        &self.out
+    }
+
+    /// Fills in the fields that only [`Enhancer::step`](crate::Enhancer::step) returns.
     #[inline]
-    pub(crate) fn step(&mut self, sample: Sample) -> Output {
-        self.step_brief(sample);
+    pub(crate) fn complete_output(&mut self, sample: &Sample) -> &Output {
         let out = &mut self.out;
         if out.used {
             out.reconstructed_n = if self.in_contact { sample.force_n - out.error_n } else { 0.0 };
@@ -144,7 +204,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
         out.cusum_n2 = self.cusum_n2;
         out.derivative_n_per_s = self.preprocessor.derivative_n_per_s();
         out.cumulative_friction_ns_per_m = self.compensation.cumulative_ns_per_m();
-        self.out
+        &self.out
     }
 
     /// As `step`, but updates only the fields that [`Enhancer::step_brief`](crate::Enhancer::step_brief) lists.
@@ -177,10 +237,14 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
     fn take(&mut self, sample: Sample, flags: SampleFlags) {
         self.out.detection = None;
         self.out.estimate = None;
+        self.out.restarted = false;
         self.out.used = flags.used();
         if !flags.used() {
+            let why = if sample.is_usable() { UnusedReason::NotLater } else { UnusedReason::of_values(&sample) };
+            self.out.unused_reason = Some(why);
             return;
         }
+        self.out.unused_reason = None;
         let index = self.ring.next_index();
         self.ring.push(sample);
         self.update_contact(flags.dt_s, sample, index);

@@ -16,6 +16,12 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> SampleRing<B> {
         Self { storage, next: 0, slot: 0 }
     }
 
+    /// Forgets every sample.
+    pub(crate) fn clear(&mut self) {
+        self.next = 0;
+        self.slot = 0;
+    }
+
     #[inline]
     pub(crate) fn next_index(&self) -> u64 {
         self.next

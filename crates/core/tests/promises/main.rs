@@ -16,3 +16,4 @@ mod stylet_intervals;
 mod stylet_numerical_validity;
 mod stylet_offsets;
 mod support;
+mod time_jumps;
