@@ -60,6 +60,198 @@ fn lines_from_standard_input_give_the_outputs_of_the_core() {
     assert!(end.contains("line 5002: 2 field(s)") && end.contains("\"bad_lines\":1"), "{end}");
 }
 
+/// Feeds text to `stylet listen --stdin`; its lines, its messages and its exit code.
+fn feed(input: &[u8]) -> (Vec<serde_json::Value>, String, Option<i32>) {
+    let mut child = listen(&["--stdin"]);
+    let mut stdin = child.stdin.take().expect("a pipe");
+    let bytes = input.to_vec();
+    let feeder = std::thread::spawn(move || {
+        let _ = stdin.write_all(&bytes);
+    });
+    let output = child.wait_with_output().expect("it ends");
+    feeder.join().expect("fed");
+    let text = String::from_utf8(output.stdout).expect("UTF-8");
+    let lines = text.lines().map(|l| serde_json::from_str(l).expect("JSON")).collect();
+    (lines, String::from_utf8(output.stderr).expect("UTF-8"), output.status.code())
+}
+
+fn summary(stderr: &str) -> serde_json::Value {
+    serde_json::from_str(stderr.lines().last().unwrap_or_default()).expect("a summary")
+}
+
+#[test]
+fn one_wrong_time_stamp_costs_one_line_and_a_new_clock_restarts_with_a_message() {
+    let mut input = String::new();
+    for k in 0..3000 {
+        input.push_str(&format!("{}\n", line(&sample(k))));
+        if k == 1000 {
+            input.push_str("1e9,0,0,0\n");
+        }
+    }
+    // The controller starts again.
+    for k in 0..2000 {
+        input.push_str(&format!("{}\n", line(&sample(k))));
+    }
+    let (lines, stderr, code) = feed(input.as_bytes());
+    assert_eq!((lines.len(), code), (5001, Some(0)));
+    let unused: Vec<usize> = (0..lines.len()).filter(|k| lines[*k]["used"] == false).collect();
+    assert_eq!(unused, [1001, 3001, 3002, 3003, 3004]);
+    for (k, line) in lines.iter().enumerate() {
+        let used = line["used"].as_bool().expect("every line says whether it was used");
+        assert_eq!(used, line.get("reason").is_none(), "line {k} has a reason if it was not used");
+        for value in ["enhanced_n", "state", "stiffness_n_per_m", "cumulative_friction_ns_per_m"] {
+            assert_eq!(line[value].is_null(), !used, "{value} of line {k}");
+        }
+        assert_eq!(line["restarts"].as_u64(), Some(u64::from(k >= 3005)), "line {k}");
+    }
+    assert_eq!(lines[5000]["enhanced_n"], lines[1999]["enhanced_n"].clone(), "after the restart as before");
+    let summary = summary(&stderr);
+    assert_eq!((summary["unused"].as_u64(), summary["restarts"].as_u64()), (Some(5), Some(1)));
+    assert!(stderr.contains("a new clock: the algorithm begins again"), "{stderr}");
+}
+
+#[test]
+fn bad_lines_are_counted_and_neither_end_the_stream_nor_reach_the_terminal() {
+    let mut input = b"0,0,0\n0.001,0,\xff\n".to_vec();
+    input.extend(b"1,\x1b[2J\x07\n");
+    input.extend(vec![b'x'; 5_000_000]);
+    input.extend(
+        b"\n{\"seq\":1,\"time_s\":0.002,\"position_m\":0,\"force_n\":0,\"frame\":\"tool\"}\n0.003,0,0",
+    );
+    let (lines, stderr, code) = feed(&input);
+    assert_eq!((lines.len(), code), (3, Some(0)), "{stderr}");
+    assert_eq!(lines[1]["bad_lines"].as_u64(), Some(3));
+    assert!(stderr.len() < 3000 && !stderr.chars().any(|c| c.is_control() && c != '\n'), "{stderr:?}");
+    assert!(stderr.contains("line 2: byte 9 is not UTF-8") && stderr.contains("\"bad_lines\":3"), "{stderr}");
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_is_reported_and_the_summary_printed() {
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("a full disk");
+    let mut child = Command::new(env!("CARGO_BIN_EXE_stylet"))
+        .args(["listen", "--stdin"])
+        .stdin(Stdio::piped())
+        .stdout(full)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it starts");
+    let mut stdin = child.stdin.take().expect("a pipe");
+    let _ = stdin.write_all(b"0,0,0\n0.001,0,0\n");
+    // The input stays open: it ends by itself.
+    let output = child.wait_with_output().expect("it ends");
+    drop(stdin);
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(
+        stderr.contains("standard output cannot be written") && stderr.contains("\"samples\":2"),
+        "{stderr}"
+    );
+}
+
+#[test]
+#[cfg(unix)]
+fn an_interrupted_session_prints_its_lines_and_its_summary() {
+    use nix::sys::signal::{Signal, kill};
+    for signal in [Signal::SIGINT, Signal::SIGTERM] {
+        let mut child = listen(&["--stdin"]);
+        let mut stdin = child.stdin.take().expect("a pipe");
+        writeln!(stdin, "0,0,0\n0.001,0,0").expect("fed");
+        let mut first = String::new();
+        let mut stdout = BufReader::new(child.stdout.take().expect("a pipe"));
+        stdout.read_line(&mut first).expect("a line");
+        kill(nix::unistd::Pid::from_raw(child.id() as i32), signal).expect("sent");
+        let mut stderr = String::new();
+        child.stderr.take().expect("a pipe").read_to_string(&mut stderr).expect("read");
+        assert_eq!(child.wait().expect("it ends").code(), Some(0), "{signal}");
+        assert_eq!(summary(&stderr)["samples"].as_u64(), Some(2), "{signal}: {stderr}");
+        drop(stdin);
+    }
+}
+
+#[test]
+fn lines_forwarded_to_the_own_port_are_refused() {
+    let port = UdpSocket::bind("127.0.0.1:0").and_then(|s| s.local_addr()).expect("a port").port();
+    let child = listen(&["--udp", &port.to_string(), "--forward", &format!("127.0.0.1:{port}")]);
+    let output = child.wait_with_output().expect("it ends");
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("choose another port"));
+}
+
+/// A session with a page; its address.
+fn with_page() -> (Child, String) {
+    let mut child = listen(&["--stdin", "--page", "0", "--quiet"]);
+    let mut first_line = String::new();
+    let mut stderr = BufReader::new(child.stderr.take().expect("a pipe"));
+    stderr.read_line(&mut first_line).expect("the page's address");
+    child.stderr = Some(stderr.into_inner());
+    (child, first_line.trim().trim_start_matches("live page: http://").trim_end_matches('/').to_owned())
+}
+
+/// First line of the response to a request.
+fn status(address: &str, request: &[u8]) -> String {
+    let mut stream = TcpStream::connect(address).expect("a connection");
+    let _ = stream.write_all(request);
+    let mut line = String::new();
+    let _ = BufReader::new(stream).read_line(&mut line);
+    line.trim().to_owned()
+}
+
+#[test]
+fn the_page_answers_only_short_requests_for_this_computer() {
+    let (mut child, address) = with_page();
+    let get = |headers: &str| status(&address, format!("GET / HTTP/1.1\r\n{headers}\r\n").as_bytes());
+    for own in ["", "Host: localhost:8080\r\n", &format!("Host: {address}\r\n"), "Host: [::1]\r\n"] {
+        assert_eq!(get(own), "HTTP/1.1 200 OK", "{own}");
+    }
+    assert_eq!(get("Host: evil.example:8080\r\n"), "HTTP/1.1 421 Misdirected Request");
+    assert_eq!(get("Host: localhost\r\nHost: evil.example\r\n"), "HTTP/1.1 421 Misdirected Request");
+    assert_eq!(get("Host: localhost\r\nOrigin: https://evil.example\r\n"), "HTTP/1.1 403 Forbidden");
+    assert_eq!(status(&address, b"POST / HTTP/1.1\r\n\r\n"), "HTTP/1.1 405 Method Not Allowed");
+    assert_eq!(status(&address, b"GET /../etc/passwd HTTP/1.1\r\n\r\n"), "HTTP/1.1 404 Not Found");
+    assert_eq!(status(&address, b"\x16\x03\x01\n\n"), "HTTP/1.1 400 Bad Request");
+    assert_eq!(status(&address, &[b'a'; 8192]), "HTTP/1.1 431 Request Header Fields Too Large");
+    // One byte at a time: the request as a whole must be complete within 5 s.
+    let start = Instant::now();
+    let mut slow = TcpStream::connect(&address).expect("a connection");
+    slow.set_read_timeout(Some(Duration::from_millis(200))).expect("set");
+    let mut answer = [0; 64];
+    let length = loop {
+        let _ = slow.write_all(b"a");
+        match slow.read(&mut answer) {
+            Ok(length) => break length,
+            Err(_) => assert!(start.elapsed() < Duration::from_secs(9), "still open"),
+        }
+    };
+    assert!(answer[..length].starts_with(b"HTTP/1.1 408") || length == 0);
+    drop(child.stdin.take());
+    assert!(child.wait().expect("it ends").success());
+}
+
+#[test]
+fn more_readers_than_places_are_refused_and_counted_and_the_core_loses_nothing() {
+    let (mut child, address) = with_page();
+    let streams: Vec<TcpStream> = (0..100)
+        .map(|_| {
+            let mut stream = TcpStream::connect(&address).expect("a connection");
+            let _ = stream.write_all(b"GET /events HTTP/1.1\r\n\r\n");
+            stream
+        })
+        .collect();
+    let mut stdin = child.stdin.take().expect("a pipe");
+    for k in 0..20_000 {
+        writeln!(stdin, "{}", line(&sample(k))).expect("fed");
+    }
+    drop(stdin);
+    let output = child.wait_with_output().expect("it ends");
+    assert!(output.status.success());
+    let summary = summary(&String::from_utf8_lossy(&output.stderr));
+    assert_eq!((summary["samples"].as_u64(), summary["unused"].as_u64()), (Some(20_000), Some(0)));
+    assert_eq!(summary["refused_readers"].as_u64(), Some(68));
+    assert!(summary["dropped_by_readers"].as_u64() > Some(0), "stalled readers lose lines");
+    drop(streams);
+}
+
 /// Sends samples at 1 kHz while a subscriber of the page stalls after its first read; returns the summary.
 fn over_loopback(seconds: u64, stall: Duration) -> serde_json::Value {
     let free = |s: std::io::Result<UdpSocket>| s.and_then(|s| s.local_addr()).expect("a port").port();

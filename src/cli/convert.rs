@@ -4,7 +4,7 @@ use crate::cli::args::ConvertArgs;
 use crate::cli::exit_codes::Failure;
 use crate::cli::terminal_output::{print, print_error};
 use std::path::Path;
-use stylet_api::output_folder::write_file_atomically;
+use stylet_api::output_folder::{check_own_file, write_file_atomically};
 use stylet_api::read_options;
 use stylet_record::{Recording, read_csv, write_csv};
 
@@ -14,9 +14,13 @@ use stylet_record::{Recording, read_csv, write_csv};
 /// [`Failure`] with the exit code that fits.
 pub fn convert(args: &ConvertArgs) -> Result<(), Failure> {
     let encode = encoder(&args.to)?;
+    let mut inputs = vec![args.from.as_path()];
+    inputs.extend(args.columns.as_deref());
     let options = read_options(args.columns.as_deref(), args.repair)?;
     let (recording, notes) = read_csv(&args.from, &options)?;
-    write_file_atomically(&args.to, &encode(&recording, &args.to)?)?;
+    let content = encode(&recording, &args.to)?;
+    check_own_file(&args.to, &inputs, Some(&content), |_| false)?;
+    write_file_atomically(&args.to, &content)?;
     if !args.quiet {
         for note in notes {
             print_error(&format!("{}: {}\n", args.from.display(), note.message));

@@ -4,7 +4,7 @@ use crate::cli::args::DiagnoseArgs;
 use crate::cli::exit_codes::Failure;
 use crate::cli::terminal_output::stage_printer;
 use std::fmt::Write as _;
-use stylet_api::output_folder::recover_parent;
+use stylet_api::output_folder::{check_folder, recover_parent};
 use stylet_api::resource_estimate;
 use stylet_diagnose::Diagnosis;
 use stylet_report::pages::diagnosis::{recording_differences, summary_sentence};
@@ -34,10 +34,13 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         args.results.quiet,
     )?;
     let inputs = args.inputs();
+    let folder = args.results.output_folder(&args.scenario, "-diagnosis");
+    let read = args.results.inputs(&args.scenario, args.data.iter().chain(&args.columns));
+    check_folder(&folder, "diagnosis.json", &read)?;
     let progress = stage_printer(args.results.quiet, " ...");
     let found = stylet_api::diagnose(&scenario, &inputs.read_recordings()?, progress)?;
-    let folder = args.results.output_folder(&args.scenario, "-diagnosis");
-    args.results.write_and_print(&folder, &found.output(&scenario, &inputs)?, || summary(&found.diagnosis))
+    let output = found.output(&scenario, &inputs)?.with_inputs(read);
+    args.results.write_and_print(&folder, &output, || summary(&found.diagnosis))
 }
 
 fn summary(d: &Diagnosis) -> String {

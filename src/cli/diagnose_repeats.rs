@@ -6,6 +6,7 @@ use crate::cli::terminal_output::stage_printer;
 use std::fmt::Write as _;
 use stylet_api::diagnose_repeats::{diagnose_repeats, load_data_set, recording_files};
 use stylet_api::diagnose_specimens::{SpecimensReport, diagnose_specimens};
+use stylet_api::output_folder::check_folder;
 use stylet_api::resource_estimate;
 use stylet_diagnose::repeated_insertions::diagnose_set::SetDiagnosis;
 use stylet_record::QualityKind;
@@ -22,15 +23,18 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let set = load_data_set(&inputs)?;
     let files = recording_files(&set, &args.data)?;
     args.limits.check(&args.scenario, &resource_estimate::estimate_diagnose(&files), results.quiet)?;
-    let runs = set.load_recordings(&files, set.tissue.layers.len())?;
     let folder = results.output_folder(&args.scenario, "-diagnosis");
+    let read = results.inputs(&args.scenario, files.iter().chain(&args.columns));
+    check_folder(&folder, "diagnosis.json", &read)?;
+    let runs = set.load_recordings(&files, set.tissue.layers.len())?;
     if !set.split_by.is_empty() {
         let found = diagnose_specimens(&set, &runs)?;
-        return results.write_and_print(&folder, &found.output(&set, &inputs)?, || specimens_summary(&found));
+        let output = found.output(&set, &inputs)?.with_inputs(read);
+        return results.write_and_print(&folder, &output, || specimens_summary(&found));
     }
     let mut progress = stage_printer(results.quiet, "");
     let found = diagnose_repeats(&set, &runs, !args.data.is_empty(), &mut progress)?;
-    results.write_and_print(&folder, &found.output(&set, &inputs)?, || {
+    results.write_and_print(&folder, &found.output(&set, &inputs)?.with_inputs(read), || {
         format!("{}{}", summary(&found.study), online_enhancement::summary(&found.online))
     })
 }

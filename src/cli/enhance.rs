@@ -3,7 +3,10 @@
 use crate::cli::args::EnhanceArgs;
 use crate::cli::exit_codes::Failure;
 use std::fmt::Write as _;
-use stylet_api::enhancement::{EnhancementResult, ResultSource, enhance_long_recording, enhance_recording};
+use stylet_api::enhancement::{
+    EnhancementResult, ResultSource, enhance_long_recording, enhance_recording, unused_note,
+};
+use stylet_api::output_folder::check_folder;
 use stylet_api::{IdentifiedModel, OutputLock, read_options, resource_estimate};
 use stylet_core::config::Model;
 use stylet_record::{read_csv, read_long_csv};
@@ -30,6 +33,9 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
     };
     let source = ResultSource { data: &args.data, config: args.config.as_deref(), command: command(args) };
     let folder = args.results.output_folder(&args.data, "");
+    let inputs =
+        args.results.inputs(&args.data, [&args.config, &args.columns, &args.model].into_iter().flatten());
+    check_folder(&folder, "enhance.json", &inputs)?;
     if let Some(estimate) = resource_estimate::estimate_long_enhance(&args.data, regressors.len()) {
         args.limits.check(&args.data, &estimate, args.results.quiet)?;
         let lock = OutputLock::new(&folder)?;
@@ -37,7 +43,8 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
             let result =
                 enhance_long_recording(&recording, notes, config, &regressors, model.as_ref(), &lock)?;
             let summary = summary(args, &result);
-            return args.results.write_locked_and_print(&lock, &result.output_files(&source)?, || summary);
+            let files = result.output_files(&source)?.with_inputs(inputs);
+            return args.results.write_locked_and_print(&lock, &files, || summary);
         }
     }
     if let Some(estimate) = resource_estimate::estimate_enhance(&args.data, regressors.len()) {
@@ -46,7 +53,7 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
     let (recording, notes) = read_csv(&args.data, &options)?;
     let result = enhance_recording(recording, notes, config, &regressors, model.as_ref())?;
     let summary = summary(args, &result);
-    args.results.write_and_print(&folder, &result.output_files(&source)?, || summary)
+    args.results.write_and_print(&folder, &result.output_files(&source)?.with_inputs(inputs), || summary)
 }
 
 fn command(args: &EnhanceArgs) -> String {
@@ -79,7 +86,7 @@ fn summary(args: &EnhanceArgs, result: &EnhancementResult) -> String {
     for note in notes {
         let _ = writeln!(out, "  note: {}", note.message);
     }
-    if let Some(note) = stylet_api::settings_note(runs) {
+    for note in stylet_api::settings_note(runs).into_iter().chain(unused_note(runs)) {
         let _ = writeln!(out, "  note: {note}");
     }
     if let Some(model) = model {

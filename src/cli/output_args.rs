@@ -5,6 +5,7 @@ use crate::cli::terminal_output::print;
 use clap::Args;
 use std::ffi::OsString;
 use std::path::{Component, Path, PathBuf};
+use stylet_api::output_folder::Inputs;
 use stylet_api::{OutputFiles, OutputLock};
 
 /// Output folder and verbosity, common to the commands that write a folder.
@@ -22,6 +23,15 @@ impl OutputArgs {
     /// The folder given by `--out`, else the default for this input.
     pub fn output_folder(&self, input: &Path, suffix: &str) -> PathBuf {
         self.out.clone().unwrap_or_else(|| default_folder(input, suffix))
+    }
+
+    /// The inputs of a command whose default folder is named after `named`.
+    pub fn inputs<'a>(&self, named: &'a Path, others: impl IntoIterator<Item = &'a PathBuf>) -> Inputs {
+        let files = std::iter::once(named).chain(others.into_iter().map(PathBuf::as_path));
+        Inputs {
+            files: files.map(Path::to_path_buf).collect(),
+            names_folder: self.out.is_none().then(|| named.to_path_buf()),
+        }
     }
 
     /// Writes the files; unless quiet, prints the summary and the path of the report.

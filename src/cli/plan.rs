@@ -5,6 +5,9 @@ use crate::cli::exit_codes::Failure;
 use crate::cli::output_args::default_folder;
 use crate::cli::terminal_output::stage_printer;
 use std::fmt::Write as _;
+use std::path::PathBuf;
+use stylet_api::output_folder::check_folder;
+use stylet_api::plan_insertion::check_plan_files;
 use stylet_api::{DiagnosisInputs, resource_estimate};
 use stylet_plan::Plan;
 use stylet_plan::identifiability::Identifiability;
@@ -33,9 +36,13 @@ pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
         &resource_estimate::estimate_diagnose(&inputs.data),
         args.quiet,
     )?;
+    let out = args.out.clone().unwrap_or_else(|| default_folder(&args.from, "-plan").join("plan.ron"));
+    let mut read = vec![inputs.scenario.as_path(), args.limits.as_path()];
+    read.extend(inputs.data.iter().chain(&inputs.columns).map(PathBuf::as_path));
+    check_plan_files(&out, &read)?;
     let progress = stage_printer(args.quiet, " ...");
     let report = stylet_api::plan_insertion::plan(&inputs, (&args.limits, &limits), !args.quick, &progress)?;
-    let out = args.out.clone().unwrap_or_else(|| default_folder(&args.from, "-plan").join("plan.ron"));
+    check_plan_files(&out, &read)?;
     report.write(&out)?;
     if args.quiet {
         return Ok(());
@@ -148,9 +155,13 @@ pub fn identifiability(args: &IdentifiabilityArgs) -> Result<(), Failure> {
         args.results.quiet,
     )?;
     let progress = stage_printer(args.results.quiet, " ...");
-    let found = stylet_api::plan_insertion::identifiability(&inputs, args.motion.as_deref(), &progress)?;
     let folder = args.results.output_folder(&args.scenario, "-identifiability");
-    args.results.write_and_print(&folder, &found.output()?, || identifiability_table(&found.identifiability))
+    let others = args.data.iter().chain(&args.columns).chain(&args.motion);
+    let read = args.results.inputs(&args.scenario, others);
+    check_folder(&folder, "identifiability.json", &read)?;
+    let found = stylet_api::plan_insertion::identifiability(&inputs, args.motion.as_deref(), &progress)?;
+    let output = found.output()?.with_inputs(read);
+    args.results.write_and_print(&folder, &output, || identifiability_table(&found.identifiability))
 }
 
 /// Explanation of the unit nat.

@@ -3,7 +3,7 @@
 use crate::cli::args::{PredictArgs, RefitArg};
 use crate::cli::exit_codes::Failure;
 use std::fmt::Write as _;
-use stylet_api::output_folder::recover_parent;
+use stylet_api::output_folder::{check_folder, recover_parent};
 use stylet_api::prediction_files::{ModelOrigin, output_files};
 use stylet_api::{Prediction, Refit, read_options, read_recordings, resource_estimate};
 use stylet_report::pages::formatting::significant_or_dash;
@@ -19,6 +19,9 @@ pub fn predict(args: &PredictArgs) -> Result<(), Failure> {
     recover_parent(&args.model)?;
     let model = Scenario::load(&args.model)?;
     args.limits.check(&args.model, &resource_estimate::estimate_predict(&args.data), args.results.quiet)?;
+    let folder = args.results.output_folder(&args.model, "-prediction");
+    let read = args.results.inputs(&args.model, args.data.iter().chain(&args.columns).chain(&args.assumed));
+    check_folder(&folder, "predict.json", &read)?;
     let ModelOrigin { diagnosis, assumed } =
         ModelOrigin::of_model_file(&args.model, args.assumed.as_deref())?;
     let recordings = read_recordings(&args.data, &read_options(args.columns.as_deref(), args.repair)?)?;
@@ -32,9 +35,8 @@ pub fn predict(args: &PredictArgs) -> Result<(), Failure> {
         .collect();
     let found =
         stylet_api::predict_recordings(&model, diagnosis.as_ref(), assumed.as_ref(), &refit, &recordings)?;
-    let folder = args.results.output_folder(&args.model, "-prediction");
-    args.results
-        .write_and_print(&folder, &output_files(&model, &args.model, &found)?, || summary(&found.prediction))
+    let output = output_files(&model, &args.model, &found)?.with_inputs(read);
+    args.results.write_and_print(&folder, &output, || summary(&found.prediction))
 }
 
 fn summary(p: &Prediction) -> String {

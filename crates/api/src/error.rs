@@ -79,6 +79,26 @@ pub enum Error {
         /// Its result file.
         file: &'static str,
     },
+    /// A file that Stylet did not write, or that is an input, is at the place of an output.
+    #[error(
+        "{path}: {why}, and would be replaced; it is left as it is: choose another folder or name (--out), or move the file away"
+    )]
+    NotReplaced {
+        /// File.
+        path: String,
+        /// What it is.
+        why: &'static str,
+    },
+    /// The default folder holds the results for another input.
+    #[error(
+        "{path}: holds the results for {input}; give this command a folder of its own with --out, or remove that one"
+    )]
+    OtherInput {
+        /// Folder.
+        path: String,
+        /// The other input.
+        input: String,
+    },
     /// A file of a set was changed or replaced.
     #[error(
         "{path}: does not belong to the same set of results as the folder's manifest.json: it was changed or replaced; repeat the \

@@ -1,7 +1,7 @@
 //! The files of one output folder, collected in memory and written as one set.
 
 use crate::error::Error;
-use crate::output_folder::{OutputLock, StagedFile};
+use crate::output_folder::{Inputs, OutputLock, StagedFile};
 use serde::Serialize;
 use std::path::Path;
 
@@ -21,6 +21,7 @@ pub struct OutputFiles {
     files: Vec<(&'static str, Vec<u8>)>,
     /// Files already staged in the locked folder.
     staged: Vec<StagedFile>,
+    inputs: Inputs,
 }
 
 impl OutputFiles {
@@ -43,15 +44,22 @@ impl OutputFiles {
         self.staged.push(part);
     }
 
+    /// Names the inputs, which are then not replaced.
+    #[must_use]
+    pub fn with_inputs(self, inputs: Inputs) -> Self {
+        Self { inputs, ..self }
+    }
+
     /// Names and contents of the files in memory.
     pub fn files(&self) -> impl Iterator<Item = (&'static str, &[u8])> {
         self.files.iter().map(|(name, content)| (*name, content.as_slice()))
     }
 
-    /// Writes all files and `manifest.json` into `folder`, which is created if missing. Files of the same names are replaced.
+    /// Writes all files and `manifest.json` into `folder`, which is created if missing. Files of the same names are replaced when they
+    /// are those of an earlier set.
     ///
     /// # Errors
-    /// [`Error::Output`], [`Error::Busy`], [`Error::OtherCommand`]; the folder is then unchanged.
+    /// [`Error::Output`], [`Error::Busy`], [`Error::OtherCommand`], [`Error::NotReplaced`]; the folder is then unchanged.
     pub fn write(&self, folder: &Path) -> Result<(), Error> {
         self.write_locked(&OutputLock::new(folder)?)
     }
@@ -59,8 +67,8 @@ impl OutputFiles {
     /// As [`Self::write`], into a folder that is locked already.
     ///
     /// # Errors
-    /// [`Error::Output`], [`Error::OtherCommand`]; the folder is then unchanged.
+    /// [`Error::Output`], [`Error::OtherCommand`], [`Error::NotReplaced`]; the folder is then unchanged.
     pub fn write_locked(&self, lock: &OutputLock) -> Result<(), Error> {
-        lock.write_set(&self.staged, &self.files)
+        lock.write_set(&self.staged, &self.files, &self.inputs)
     }
 }

@@ -4,7 +4,11 @@
 //! process killed before that rename leaves the old set, one killed after it the new set: the next command that uses the folder completes
 //! the move ([`recover`]). After a write error the old set is restored.
 
+mod replaceable;
+
 use crate::error::Error;
+use replaceable::{Content, check_files, check_same_input, comparable};
+pub use replaceable::{check_folder, check_own_file};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -40,6 +44,18 @@ const RESULT_FILES: [(&str, &str); 9] = [
 struct Manifest {
     stylet: String,
     sha256: BTreeMap<String, String>,
+    /// The input, in a folder that was named after it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    input: Option<String>,
+}
+
+/// Inputs of a command, which its outputs must not replace.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Inputs {
+    /// All files read.
+    pub files: Vec<PathBuf>,
+    /// The one after which the output folder is named; `None` when the folder was given.
+    pub names_folder: Option<PathBuf>,
 }
 
 /// Exclusive use of an output folder, until it is dropped.
@@ -162,14 +178,28 @@ impl OutputLock {
         Ok(StagedFileWriter { name, place, file, hash: Sha256::new() })
     }
 
-    /// Writes a set: files in memory and staged files. Files of the same names are replaced, others are left alone.
+    /// Writes a set: files in memory and staged files. Files of the same names are replaced when the folder's manifest lists them and they are
+    /// no inputs; others are left alone.
     ///
     /// # Errors
-    /// [`Error::OtherCommand`], [`Error::Output`]; the folder is then unchanged. [`Error::Unfinished`] when the old set cannot be restored.
-    pub fn write_set(&self, parts: &[StagedFile], files: &[(&'static str, Vec<u8>)]) -> Result<(), Error> {
+    /// [`Error::OtherCommand`], [`Error::NotReplaced`], [`Error::OtherInput`], [`Error::Output`]; the folder is then unchanged.
+    /// [`Error::Unfinished`] when the old set cannot be restored.
+    pub fn write_set(
+        &self,
+        parts: &[StagedFile],
+        files: &[(&'static str, Vec<u8>)],
+        inputs: &Inputs,
+    ) -> Result<(), Error> {
         let names = files.iter().map(|(name, _)| *name).chain(parts.iter().map(|part| part.name));
         check_same_command(&self.folder, &names.collect::<Vec<_>>())?;
-        let Err(why) = self.write_until(parts, files, &mut || false) else { return Ok(()) };
+        let new = files.iter().map(|(name, content)| (*name, Content::Bytes(content)));
+        let new = new.chain(parts.iter().map(|part| (part.name, Content::Sha256(&part.sha256))));
+        check_files(&self.folder, &inputs.files, new)?;
+        let input = inputs.names_folder.as_deref().map(comparable);
+        if let Some(input) = &input {
+            check_same_input(&self.folder, input)?;
+        }
+        let Err(why) = self.write_until(parts, files, input, &mut || false) else { return Ok(()) };
         let names = files.iter().map(|(name, _)| *name);
         let names = names.chain(parts.iter().map(|part| part.name)).chain([MANIFEST]);
         if self.folder.join(COMPLETE).exists() && restore_old(&self.folder, names).is_err() {
@@ -184,6 +214,7 @@ impl OutputLock {
         &self,
         parts: &[StagedFile],
         files: &[(&'static str, Vec<u8>)],
+        input: Option<String>,
         killed: &mut dyn FnMut() -> bool,
     ) -> io::Result<()> {
         let folder = &self.folder;
@@ -198,7 +229,8 @@ impl OutputLock {
             check_killed(killed)?;
             fs::create_dir(&new)?;
         }
-        let mut manifest = Manifest { stylet: env!("CARGO_PKG_VERSION").to_owned(), ..Manifest::default() };
+        let mut manifest =
+            Manifest { stylet: env!("CARGO_PKG_VERSION").to_owned(), input, ..Manifest::default() };
         for (name, content) in files {
             check_killed(killed)?;
             synced(&new.join(name), content)?;
@@ -292,11 +324,17 @@ pub fn verify_manifest(folder: &Path, names: &[&str]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Writes one file atomically: to a temporary name, synced, then renamed.
+/// Writes one file atomically: to a temporary name, synced, then renamed. What is no regular file, such as `/dev/stdout`, is written to.
 ///
 /// # Errors
 /// [`Error::Output`]; the former file is then unchanged.
 pub fn write_file_atomically(path: &Path, content: &[u8]) -> Result<(), Error> {
+    let special = |found: fs::Metadata| !found.is_file() && !found.is_dir();
+    if fs::metadata(path).is_ok_and(special) {
+        let written =
+            fs::OpenOptions::new().write(true).open(path).and_then(|mut file| file.write_all(content));
+        return written.map_err(|why| failed(path, why));
+    }
     let mut part = path.as_os_str().to_owned();
     part.push(format!(".{}.part", std::process::id()));
     let part = PathBuf::from(part);

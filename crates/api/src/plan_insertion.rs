@@ -4,7 +4,7 @@ use crate::diagnose::diagnose;
 use crate::diagnosis_inputs::DiagnosisInputs;
 use crate::error::Error;
 use crate::output_files::{OutputFiles, to_json_bytes};
-use crate::output_folder::write_file_atomically;
+use crate::output_folder::{check_own_file, write_file_atomically};
 use std::path::Path;
 use stylet_diagnose::NamedRecording;
 use stylet_plan::identifiability::Identifiability;
@@ -80,6 +80,22 @@ pub fn plan_after_recordings(
     Ok(PlanReport { plan, scenario, verdict, ground })
 }
 
+/// First words of a planned motion.
+const MOTION_COMMENT: &str = "// The next insertion, planned by stylet";
+
+/// Refuses to replace an input, or a file that is not of an earlier plan, by a plan written to `out`.
+///
+/// # Errors
+/// [`Error::NotReplaced`].
+pub fn check_plan_files(out: &Path, inputs: &[&Path]) -> Result<(), Error> {
+    let contains = |text: &'static str| {
+        move |bytes: &[u8]| bytes.windows(text.len()).any(|window| window == text.as_bytes())
+    };
+    check_own_file(out, inputs, None, |bytes| bytes.starts_with(MOTION_COMMENT.as_bytes()))?;
+    check_own_file(&out.with_extension("json"), inputs, None, contains("\"probability_decided\""))?;
+    check_own_file(&out.with_extension("html"), inputs, None, contains("class=\"disclaimer\""))
+}
+
 impl PlanReport {
     /// The motion as RON: for `stylet run --motion`, or as a scenario's motion.
     ///
@@ -112,7 +128,7 @@ impl PlanReport {
             std::fs::create_dir_all(folder).map_err(|why| Error::output(out, why))?;
         }
         let motion = format!(
-            "// The next insertion, planned by stylet {}: a motion for `stylet run SCENARIO.ron --motion {}`.\n{}\n",
+            "{MOTION_COMMENT} {}: a motion for `stylet run SCENARIO.ron --motion {}`.\n{}\n",
             env!("CARGO_PKG_VERSION"),
             out.file_name().unwrap_or(out.as_os_str()).to_string_lossy(),
             self.motion_ron()?

@@ -1,7 +1,7 @@
 //! The folder of a sweep: resumable shards, the tables made of them, and single trials.
 
 use crate::error::Error;
-use crate::output_folder::{self, OutputLock};
+use crate::output_folder::{self, Inputs, OutputLock};
 use crate::sweep::write_result_files;
 use std::path::Path;
 use std::time::Instant;
@@ -134,7 +134,7 @@ pub fn read_all_shards(sweep: &Sweep, columns: &Columns, out: &Path) -> Result<D
     all.finish()
 }
 
-/// Writes the results into the locked folder `out` and removes the shards.
+/// Writes the results into the locked folder `out` and removes the shards, but no other files beside them.
 ///
 /// # Errors
 /// [`Error::Output`].
@@ -143,10 +143,11 @@ pub fn write_results(
     columns: &Columns,
     rows: &DiskTrialTable,
     (lock, out): (&OutputLock, &Path),
+    inputs: Inputs,
 ) -> Result<Summary, Error> {
     let (output, summary) = write_result_files(sweep, columns, rows, lock)?;
-    output.write_locked(lock)?;
-    let _ = std::fs::remove_dir_all(out.join(shard::SHARD_FOLDER));
+    output.with_inputs(inputs).write_locked(lock)?;
+    shard::remove_all(out);
     Ok(summary)
 }
 

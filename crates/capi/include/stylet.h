@@ -15,7 +15,7 @@
 typedef enum StyletStatus {
   // Success.
   STYLET_OK = 0,
-  // The sample was ignored: not finite, out of range, or not later than the previous one. The output repeats the last one.
+  // The sample was ignored; `stylet_last_error` says why. The output repeats the last one.
   STYLET_UNUSED = 1,
   // A pointer is null, or the memory is not aligned.
   STYLET_NULL = -1,
@@ -130,6 +130,8 @@ typedef struct StyletOutput {
   double layer_stiffness_n_per_m;
   // Friction of that layer in the model's unit.
   double layer_friction;
+  // Not zero when the algorithm was re-initialised before this sample because of a new clock.
+  int32_t restarted;
 } StyletOutput;
 
 #ifdef __cplusplus

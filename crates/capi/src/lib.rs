@@ -8,7 +8,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use stylet_core::config::{Algorithm, Contact, EnhanceConfig, Model};
-use stylet_core::{Enhancer, Output, Sample};
+use stylet_core::{Enhancer, Output, Sample, UnusedReason};
 
 /// Status of a call.
 #[repr(C)]
@@ -16,7 +16,7 @@ use stylet_core::{Enhancer, Output, Sample};
 pub enum StyletStatus {
     /// Success.
     StyletOk = 0,
-    /// The sample was ignored: not finite, out of range, or not later than the previous one. The output repeats the last one.
+    /// The sample was ignored; `stylet_last_error` says why. The output repeats the last one.
     StyletUnused = 1,
     /// A pointer is null, or the memory is not aligned.
     StyletNull = -1,
@@ -138,6 +138,8 @@ pub struct StyletOutput {
     pub layer_stiffness_n_per_m: f64,
     /// Friction of that layer in the model's unit.
     pub layer_friction: f64,
+    /// Not zero when the algorithm was re-initialised before this sample because of a new clock.
+    pub restarted: i32,
 }
 
 /// The core; it occupies `stylet_size` bytes.
@@ -360,10 +362,17 @@ pub unsafe extern "C" fn stylet_step(
     if let Some(out) = unsafe { out.as_mut() } {
         *out = to_c_output(&output);
     }
-    if output.used {
-        return StyletStatus::StyletOk;
-    }
-    core.error = c"the sample was ignored: not finite, out of range, or not later than the previous one";
+    let Some(reason) = output.unused_reason else { return StyletStatus::StyletOk };
+    core.error = match reason {
+        UnusedReason::NotFinite => c"the sample was ignored: a value is not finite",
+        UnusedReason::OutOfRange => c"the sample was ignored: position, velocity or force is out of range",
+        UnusedReason::NotLater => {
+            c"the sample was ignored: its time is not later than that of the last used sample"
+        }
+        UnusedReason::TimeJump => {
+            c"the sample was ignored: its time jumped (an outlier, or the first samples of a new clock)"
+        }
+    };
     StyletStatus::StyletUnused
 }
 
@@ -389,6 +398,7 @@ fn to_c_output(o: &Output) -> StyletOutput {
         layer_thickness_m: estimate.thickness_m,
         layer_stiffness_n_per_m: estimate.stiffness_n_per_m,
         layer_friction: estimate.friction,
+        restarted: i32::from(o.restarted),
     }
 }
 

@@ -113,7 +113,11 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             Some(_) => KalmanEnhancer::is_usable(sample),
             None => sample.is_usable(),
         };
-        if usable { self.clock.check(sample.time_s) } else { Verdict::Ignore(UnusedReason::of_values(sample)) }
+        if usable {
+            self.clock.check(sample.time_s)
+        } else {
+            Verdict::Ignore(UnusedReason::of_values(sample))
+        }
     }
 
     #[cold]

@@ -95,10 +95,20 @@ impl Output {
     fn estimate(&self) -> Option<(usize, f64, f64, f64)> {
         self.out.estimate.map(|e| (e.layer, e.thickness_m, e.stiffness_n_per_m, e.friction))
     }
-    /// False when the sample was passed over.
+    /// False when the sample was ignored; the values are then those of the sample before.
     #[getter]
     fn used(&self) -> bool {
         self.out.used
+    }
+    /// Why the sample was ignored, or None.
+    #[getter]
+    fn unused_reason(&self) -> Option<&'static str> {
+        self.out.unused_reason.map(stylet::core::UnusedReason::message)
+    }
+    /// True at the first sample after a restart because of a new clock.
+    #[getter]
+    fn restarted(&self) -> bool {
+        self.out.restarted
     }
     fn __repr__(&self) -> String {
         format!(
@@ -138,11 +148,12 @@ impl Enhancer {
         Output { out: self.core.step(Sample { time_s, position_m, velocity_mps, force_n }) }
     }
 
-    /// Processes one sample and returns only the enhanced force (N): the fastest call.
+    /// Processes one sample and returns only the enhanced force (N), NaN for an ignored sample: the fastest call.
     #[pyo3(signature = (*, time_s, position_m, velocity_mps, force_n))]
     #[inline]
     fn enhanced(&mut self, time_s: f64, position_m: f64, velocity_mps: f64, force_n: f64) -> f64 {
-        self.core.step_brief(Sample { time_s, position_m, velocity_mps, force_n }).enhanced_n
+        let out = self.core.step_brief(Sample { time_s, position_m, velocity_mps, force_n });
+        if out.used { out.enhanced_n } else { f64::NAN }
     }
 
     /// Processes many samples, continuing from the last state.
@@ -189,8 +200,9 @@ impl Enhancer {
                     *sample = Sample { time_s: t[i], position_m: z[i], velocity_mps: v[i], force_n: f[i] };
                 }
                 core.run(&block[..count], |out| {
-                    enhanced.push(out.enhanced_n);
-                    error.push(out.error_n);
+                    // The values of an ignored sample are not current.
+                    enhanced.push(if out.used { out.enhanced_n } else { f64::NAN });
+                    error.push(if out.used { out.error_n } else { f64::NAN });
                     state.push(out.state as u8);
                     ruptures.push(out.ruptures as u32);
                 });

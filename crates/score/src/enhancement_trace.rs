@@ -5,7 +5,7 @@ use crate::offline_least_squares::{LayerSample, OfflineEstimate, fit_layer_offli
 use crate::score::Score;
 use crate::scorer::{Scorer, TrueSample};
 use stylet_core::config::{Algorithm, EnhanceConfig, Model};
-use stylet_core::{Baseline, Detection, LayerEstimate, Sample, State, ZeroStep};
+use stylet_core::{Baseline, Detection, LayerEstimate, Sample, State, UnusedReason, ZeroStep};
 use stylet_record::LayerTruth;
 use stylet_record::{Recording, Truth};
 
@@ -34,6 +34,8 @@ pub struct Trace {
     pub derivative_n_per_s: Vec<f64>,
     /// State.
     pub state: Vec<State>,
+    /// Why the core ignored the sample, whose values are then NaN; `None` for the others.
+    pub unused_reason: Vec<Option<UnusedReason>>,
     /// Declared ruptures.
     pub detections: Vec<Detection>,
     /// Estimates of the traversed layers.
@@ -50,6 +52,10 @@ pub struct Trace {
     pub baseline: Baseline,
     /// Samples that the core ignored.
     pub unused: usize,
+    /// Number of times that the core was re-initialised because of a new clock.
+    pub restarts: usize,
+    /// Index of the first estimate since the last restart, after which layers are counted from 1 again.
+    pub first_estimate: usize,
 }
 
 impl Trace {
@@ -118,10 +124,15 @@ impl Trace {
         self.cusum_n2.push(out.cusum_n2);
         self.derivative_n_per_s.push(out.derivative_n_per_s);
         self.state.push(out.state);
+        self.unused_reason.push(out.unused_reason);
     }
 
     /// Records the ruptures, estimates and contact of a sample.
     pub fn record_events(&mut self, out: &stylet_core::Output) {
+        if out.restarted {
+            self.restarts += 1;
+            self.first_estimate = self.estimates.len();
+        }
         if let Some(step) = out.zero_step {
             // A step of the zero that was declared as a rupture at first.
             if let Some(layer) = step.withdrawn {
@@ -133,8 +144,9 @@ impl Trace {
         self.detections.extend(out.detection);
         if let Some(estimate) = out.estimate {
             // A later estimate of a layer replaces the earlier one, which is among the last.
-            if let Some(earlier) = self.estimates.iter().rposition(|e| e.layer == estimate.layer) {
-                self.estimates.remove(earlier);
+            let since_restart = self.estimates.get(self.first_estimate..).unwrap_or_default();
+            if let Some(earlier) = since_restart.iter().rposition(|e| e.layer == estimate.layer) {
+                self.estimates.remove(self.first_estimate + earlier);
             }
             self.estimates.push(estimate);
         }
@@ -197,6 +209,9 @@ pub fn score_run(
     let trace = Trace::run(recording, force_n, config, surface_m, |index, out| {
         scorer.add_event(out);
         scorer.set_contact(out.contact_m);
+        if !out.used {
+            return;
+        }
         scorer.add_sample(
             &TrueSample {
                 position_m: recording.position_m[index],

@@ -13,6 +13,22 @@ pub fn enhancer_for(samples: usize, config: &EnhanceConfig, surface_m: f64) -> E
     Enhancer::new(config.clone(), surface_m, storage)
 }
 
+/// The output of an ignored sample without the values of the previous one.
+fn without_values(out: Output) -> Output {
+    Output {
+        enhanced_n: f64::NAN,
+        reconstructed_n: f64::NAN,
+        error_n: f64::NAN,
+        theta: [f64::NAN; 2],
+        cusum_n2: f64::NAN,
+        derivative_n_per_s: f64::NAN,
+        cumulative_friction_ns_per_m: f64::NAN,
+        band_n: None,
+        sd: [f64::NAN; 3],
+        ..out
+    }
+}
+
 /// An online core, and optionally a model that gives the shaft friction.
 ///
 /// The model maps a sample and the number of ruptures that the core has declared so far to the friction in N. Ruptures come
@@ -30,9 +46,13 @@ impl<M: FnMut(&Sample, usize) -> f64> EnhancerWithModel<M> {
         Self { core, model }
     }
 
-    /// Processes one sample. With a model, enhanced force and band are those of [`Enhancer::apply_model_friction`].
+    /// Processes one sample. With a model, enhanced force and band are those of [`Enhancer::apply_model_friction`]. The values of
+    /// a sample that the core has ignored are not current, and NaN.
     pub fn step(&mut self, sample: Sample) -> Output {
         let mut out = self.core.step(sample);
+        if !out.used {
+            return without_values(out);
+        }
         if let Some(model) = &mut self.model {
             let friction_n = model(&sample, out.ruptures);
             if let Some((enhanced_n, band_n)) = self.core.apply_model_friction(friction_n) {

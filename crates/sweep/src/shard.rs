@@ -249,6 +249,33 @@ pub fn read(
         .collect())
 }
 
+/// Removes the shards in the folder and what interrupted writers left of some; then the folder, unless it holds other files. What cannot be
+/// removed stays: the results are complete without it.
+pub fn remove_all(out: &Path) {
+    let folder = out.join(SHARD_FOLDER);
+    for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        // An interrupted writer's file ends in its process number and `.part`.
+        let unfinished =
+            name.strip_suffix(".part").and_then(|rest| rest.rsplit_once('.')).map(|(stem, _)| stem);
+        if split_of(&name).is_some()
+            || unfinished.is_some_and(|stem| split_of(&format!("{stem}.shard")).is_some())
+        {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+    // Fails for a folder that is not empty, as intended.
+    let _ = fs::remove_dir(&folder);
+}
+
+/// Number of shards in the name of a shard, as [`ShardNumber::path`] makes it; `None` for other files.
+fn split_of(name: &str) -> Option<u64> {
+    let (shard, of) = name.strip_suffix(".shard")?.split_once("-of-")?;
+    let six_digits = |text: &str| text.len() == 6 && text.bytes().all(|b| b.is_ascii_digit());
+    if six_digits(shard) && six_digits(of) { of.parse().ok() } else { None }
+}
+
 /// Number of shards according to the file names in the folder.
 ///
 /// # Errors
@@ -260,8 +287,7 @@ pub fn shard_count(out: &Path) -> Result<u64, ShardError> {
         .flatten()
         .filter_map(|entry| {
             let name = entry.ok()?.file_name().into_string().ok()?;
-            let of = name.strip_suffix(".shard")?.split_once("-of-")?.1.parse().ok()?;
-            Some((of, name))
+            Some((split_of(&name)?, name))
         })
         .collect();
     found.sort();

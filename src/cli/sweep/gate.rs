@@ -8,7 +8,7 @@ use crate::cli::terminal_output::print;
 use std::fmt::Write as _;
 use std::path::Path;
 use stylet_api::output_files::to_json_bytes;
-use stylet_api::output_folder::write_file_atomically;
+use stylet_api::output_folder::{check_own_file, write_file_atomically};
 use stylet_sweep::score_gate::{
     Baseline, GateResult, baseline, baseline_changes, describe_result, junit_xml, load,
 };
@@ -21,6 +21,7 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
     let gates = load(&args.gates, args.seed)?;
     let at = args.baseline.clone().unwrap_or_else(|| args.gates.with_extension("baseline.json"));
     let old = read(&at)?;
+    check_outputs(args, &at)?;
     let progress = Progress::new(gates.iter().map(|g| g.trials()).sum(), "trials", args.quiet);
     let judged: Vec<GateResult> = with_threads(args.threads.unwrap_or(0), || {
         let all: Result<Vec<Vec<GateResult>>, _> =
@@ -54,6 +55,30 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
     let failed = judged.iter().filter(|j| !j.passed).count();
     // A bound that does not hold matters more than an output that cannot be printed.
     if failed > 0 { Err(Failure::Gate { failed, of: judged.len() }) } else { printed }
+}
+
+/// Refuses to replace files by the results before the trials run.
+fn check_outputs(args: &GateArgs, baseline: &Path) -> Result<(), Failure> {
+    let inputs = [args.gates.as_path(), baseline];
+    if args.update {
+        // A file that is no baseline was refused when it was read.
+        check_own_file(baseline, &inputs[..1], None, |_| true)?;
+    }
+    if let Some(junit) = &args.junit {
+        let own = b"<testsuite name=\"stylet gate\"";
+        check_own_file(junit, &inputs, None, |bytes| bytes.windows(own.len()).any(|part| part == own))?;
+    }
+    if let Some(json) = &args.json {
+        check_own_file(json, &inputs, None, is_gate_results)?;
+    }
+    Ok(())
+}
+
+/// A list of results that an earlier gate has written.
+fn is_gate_results(bytes: &[u8]) -> bool {
+    let results: Vec<serde_json::Value> = serde_json::from_slice(bytes).unwrap_or_default();
+    let keys = ["gate", "score", "statistic", "passed"];
+    !results.is_empty() && results.iter().all(|result| keys.iter().all(|key| result.get(key).is_some()))
 }
 
 /// The differences from the baseline, and whether it was replaced.

@@ -4,6 +4,7 @@ use crate::cli::args::ReplayArgs;
 use crate::cli::exit_codes::Failure;
 use crate::cli::output_args::OutputArgs;
 use crate::cli::run::run_scenario;
+use stylet_api::output_folder::Inputs;
 use stylet_api::sweep_folder::trial_scenario;
 
 /// The command.
@@ -15,5 +16,5 @@ pub fn replay(args: &ReplayArgs) -> Result<(), Failure> {
     let out = args.out.clone().unwrap_or_else(|| args.dir.join(format!("trial-{}", args.trial)));
     // The run writes the scenario into its folder, where its report names it.
     let file = out.join("scenario.ron");
-    run_scenario(&scenario, &file, &OutputArgs { out: Some(out), quiet: args.quiet })
+    run_scenario(&scenario, &file, Inputs::default(), &OutputArgs { out: Some(out), quiet: args.quiet })
 }

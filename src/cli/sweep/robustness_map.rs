@@ -5,7 +5,9 @@ use crate::cli::args::MapArgs;
 use crate::cli::exit_codes::Failure;
 use crate::cli::progress_bar::Progress;
 use std::fmt::Write as _;
-use stylet_report::pages::sweep::failure_map_svg;
+use std::path::{Path, PathBuf};
+use stylet_api::output_folder::check_own_file;
+use stylet_report::pages::sweep::{MAP_TITLE, failure_map_svg};
 use stylet_sweep::{Columns, FailureMapRow, Overrides, Sweep, failure_map_rows, run_trials};
 
 /// Runs the sweeps, prints the failure rates and writes the map.
@@ -13,6 +15,9 @@ use stylet_sweep::{Columns, FailureMapRow, Overrides, Sweep, failure_map_rows, r
 /// # Errors
 /// [`Failure`] when a sweep is wrong or the picture cannot be written.
 pub fn map(args: &MapArgs) -> Result<(), Failure> {
+    let inputs: Vec<&Path> = args.sweeps.iter().map(PathBuf::as_path).collect();
+    let own = |bytes: &[u8]| bytes.windows(MAP_TITLE.len()).any(|part| part == MAP_TITLE.as_bytes());
+    check_own_file(&args.svg, &inputs, None, own)?;
     let overrides = Overrides { trials: args.trials, seed: None };
     let sweeps: Vec<Sweep> =
         args.sweeps.iter().map(|file| Sweep::load(file, overrides)).collect::<Result<_, _>>()?;

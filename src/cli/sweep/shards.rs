@@ -1,7 +1,7 @@
 //! `stylet sweep plan | run-shard | merge`: a sweep spread over machines.
 
 use super::thread_pool::with_threads;
-use super::whole_sweep::finish;
+use super::whole_sweep::{finish, scenario_file};
 use crate::cli::args::{MergeArgs, RunShardArgs, SweepPlanArgs, SweepSelection};
 use crate::cli::exit_codes::Failure;
 use crate::cli::output_args::default_folder;
@@ -57,5 +57,6 @@ pub fn merge(args: &MergeArgs) -> Result<(), Failure> {
     let out = args.results.output_folder(&args.selection.sweep, "");
     let lock = OutputLock::new(&out)?;
     let rows = read_all_shards(&sweep, &columns, &out)?;
-    finish(&sweep, &columns, &rows, (&lock, &out), args.results.quiet)
+    let inputs = args.results.inputs(&args.selection.sweep, [&scenario_file(&args.selection.sweep, &sweep)]);
+    finish(&sweep, &columns, &rows, (&lock, &out), inputs, args.results.quiet)
 }

@@ -6,7 +6,8 @@ use crate::cli::exit_codes::Failure;
 use crate::cli::progress_bar::Progress;
 use crate::cli::terminal_output::print;
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use stylet_api::output_folder::{Inputs, check_folder};
 use stylet_api::sweep_folder::{SHARD_TRIALS, check_unfinished, run_all_shards, write_results};
 use stylet_api::{OutputLock, resource_estimate};
 use stylet_report::pages::formatting::significant_or_dash;
@@ -31,12 +32,19 @@ pub fn run_whole(args: &SweepArgs) -> Result<(), Failure> {
     let of = sweep.trials().div_ceil(SHARD_TRIALS);
     // Held until the results are complete, so that shards, tables and `sweep.ron` belong to one sweep.
     let lock = OutputLock::new(&out)?;
+    let inputs = args.results.inputs(file, [&scenario_file(file, &sweep)]);
+    check_folder(&out, "summary.json", &inputs)?;
     check_unfinished(&sweep, &columns, &out, of, args.resume)?;
     let progress = Progress::new(sweep.trials(), "trials", args.results.quiet);
     let (present, done) = (|n| progress.skip(n), |n| progress.advance(n));
     let rows = with_threads(threads, || run_all_shards(&sweep, &columns, &out, of, &present, &done))??;
     progress.finish();
-    finish(&sweep, &columns, &rows, (&lock, &out), args.results.quiet)
+    finish(&sweep, &columns, &rows, (&lock, &out), inputs, args.results.quiet)
+}
+
+/// The scenario that a sweep file names.
+pub fn scenario_file(file: &Path, sweep: &Sweep) -> PathBuf {
+    file.parent().unwrap_or(Path::new("")).join(&sweep.file.scenario)
 }
 
 /// Writes the results, removes the shards, and prints the summary unless `quiet`.
@@ -48,9 +56,10 @@ pub fn finish(
     columns: &Columns,
     rows: &DiskTrialTable,
     (lock, out): (&OutputLock, &Path),
+    inputs: Inputs,
     quiet: bool,
 ) -> Result<(), Failure> {
-    let summary = write_results(sweep, columns, rows, (lock, out))?;
+    let summary = write_results(sweep, columns, rows, (lock, out), inputs)?;
     if quiet { Ok(()) } else { print(&summary_text(&summary, out)) }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::error::Error;
 use crate::run_report::AlgorithmRun;
-use stylet_core::Output;
+use stylet_core::{Output, State, UnusedReason};
 use stylet_record::csv_writer::{RowWriter, column_names};
 use stylet_record::{RecordError, Recording};
 
@@ -16,7 +16,18 @@ pub(super) fn header(mut columns: Vec<String>) -> Vec<String> {
     columns
 }
 
-/// Output values of a sample, without its state.
+/// The state of a sample, or why the core ignored it.
+pub(super) fn state_word(state: State, unused: Option<UnusedReason>) -> &'static str {
+    match unused {
+        None => state.name(),
+        Some(UnusedReason::NotFinite) => "unused: not finite",
+        Some(UnusedReason::OutOfRange) => "unused: out of range",
+        Some(UnusedReason::NotLater) => "unused: time not later",
+        Some(UnusedReason::TimeJump) => "unused: time jump",
+    }
+}
+
+/// Output values of a sample, without its state; empty where the core ignored it.
 pub(super) fn enhanced_values(out: &Output) -> [f64; 5] {
     let [low, high] = out.band_n.unwrap_or([f64::NAN; 2]);
     [out.enhanced_n, low, high, out.reconstructed_n, out.cumulative_friction_ns_per_m]
@@ -42,7 +53,8 @@ pub(super) fn enhanced_csv(recording: &Recording, runs: &[AlgorithmRun]) -> Resu
             trace.reconstructed_n[at],
             trace.cumulative_friction_ns_per_m[at],
         ];
-        table.write_row(&row, &outputs, trace.state[at].name()).map_err(failed)?;
+        let word = state_word(trace.state[at], trace.unused_reason[at]);
+        table.write_row(&row, &outputs, word).map_err(failed)?;
     }
     Ok(table.finish().map_err(failed)?)
 }

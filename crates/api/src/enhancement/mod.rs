@@ -9,6 +9,8 @@ mod streaming;
 mod whole_recording;
 
 pub use identified_model::IdentifiedModel;
-pub use result::{AppliedModel, EnhancementResult, RecordingExtent, ResultSource, enhance_recording};
+pub use result::{
+    AppliedModel, EnhancementResult, RecordingExtent, ResultSource, enhance_recording, unused_note,
+};
 pub use streaming::enhance_long_recording;
 pub use whole_recording::{enhance, enhance_as, enhance_with_model};

@@ -113,6 +113,22 @@ pub fn enhance_recording(
     Ok(EnhancementResult { recording, extent, notes, algorithm_runs: runs, hash, config, model, table })
 }
 
+/// Samples that the algorithms ignored, and restarts because of a new clock, as a sentence.
+#[must_use]
+pub fn unused_note(runs: &[AlgorithmRun]) -> Option<String> {
+    let unused = runs.iter().map(|r| r.trace.unused).max().unwrap_or(0);
+    let restarts = runs.iter().map(|r| r.trace.restarts).max().unwrap_or(0);
+    let ignored = (unused > 0).then(|| {
+        format!("{unused} sample(s) were ignored by the algorithm; their rows of enhanced.csv say why in the column state.")
+    });
+    let restarted = (restarts > 0).then(|| {
+        format!(
+            "The clock was set {restarts} time(s): the algorithm began again there, and counts layers from 1."
+        )
+    });
+    (unused + restarts > 0).then(|| ignored.into_iter().chain(restarted).collect::<Vec<_>>().join(" "))
+}
+
 impl EnhancementResult {
     /// `enhance.json` for a recording called `name`.
     ///
@@ -158,6 +174,7 @@ impl EnhancementResult {
                 .iter()
                 .map(|n| n.message.clone())
                 .chain(settings_note(runs))
+                .chain(unused_note(runs))
                 .chain(self.model.iter().map(AppliedModel::summary))
                 .chain(self.model.iter().flat_map(|model| model.notes.clone()))
                 .chain(selection)

@@ -32,6 +32,10 @@ pub(super) struct RunResult {
     contact_s: Option<f64>,
     ruptures: Vec<Rupture>,
     layers: Vec<Layer>,
+    /// Samples that the algorithm ignored; their rows of `enhanced.csv` say why.
+    unused_samples: usize,
+    /// Restarts of the algorithm because of a new clock.
+    restarts: usize,
 }
 
 /// A detection in `enhance.json`.
@@ -121,6 +125,8 @@ pub(super) fn results_of_run(run: &AlgorithmRun) -> RunResult {
             })
             .collect(),
         layers: run.trace.estimates.iter().map(layer).collect(),
+        unused_samples: run.trace.unused,
+        restarts: run.trace.restarts,
     }
 }
 

@@ -1,7 +1,7 @@
 //! Enhancement of a recording of any length in bounded memory: sample by sample from disk through the core into the output
 //! folder.
 
-use super::enhanced_csv::{enhanced_values, header};
+use super::enhanced_csv::{enhanced_values, header, state_word};
 use super::identified_model::IdentifiedModel;
 use super::plot_samples::PlotSampler;
 use super::result::{AppliedModel, EnhancedTable, EnhancementResult, RecordingExtent};
@@ -68,7 +68,8 @@ pub fn enhance_long_recording(
             hashed_row.extend(hashed_values(out));
         }
         if let Some(first) = outs.first() {
-            table.write_row(row, &enhanced_values(first), first.state.name()).map_err(failed)?;
+            let word = state_word(first.state, first.unused_reason);
+            table.write_row(row, &enhanced_values(first), word).map_err(failed)?;
         }
         columns.push(&hashed_row).map_err(failed)?;
         plot.add(index, &s, &outs);

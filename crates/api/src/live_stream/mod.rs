@@ -1,16 +1,19 @@
 //! The online core on a live stream: samples arrive by UDP or as lines of text; outputs leave as JSON lines, by UDP, and to a
 //! page in a browser.
 //!
-//! The receiving thread only parses, steps the core and appends one line to the ring of every subscriber. A slow subscriber
-//! loses the oldest lines of its own ring; the core never waits for it.
+//! The receiving thread only parses, steps the core and appends one line to a ring, which subscribers read on their own. A slow
+//! subscriber loses the oldest lines; the core never waits for any, and its work does not depend on their number.
 
 mod broadcast;
 mod http_page;
+mod http_request;
+mod line_splitter;
 mod sample_parser;
 mod stream_session;
 mod velocity_from_positions;
 
 pub use broadcast::{Broadcast, Subscriber};
-pub use http_page::serve_page;
-pub use sample_parser::{InvalidLine, StreamSample, parse_line};
-pub use stream_session::{Session, StreamCounts};
+pub use http_page::{MAX_READERS, MAX_REQUEST_BYTES, PageServer, REQUEST_TIMEOUT};
+pub use line_splitter::{LineSplitter, MAX_LINE_BYTES};
+pub use sample_parser::{InvalidLine, StreamSample, parse_bytes, parse_line};
+pub use stream_session::{Report, Session, StreamCounts};

@@ -45,7 +45,7 @@ fn killed_at_any_disk_operation_the_folder_holds_the_old_or_the_new_set() -> Res
     let (mut olds, mut news, mut at) = (0, 0, 0);
     loop {
         let folder = scratch.0.join(format!("{at}"));
-        OutputLock::new(&folder)?.write_set(&[], &set("old"))?;
+        OutputLock::new(&folder)?.write_set(&[], &set("old"), &Inputs::default())?;
         fs::write(folder.join("notes.txt"), "mine").map_err(|e| failed(&folder, e))?;
         let lock = OutputLock::new(&folder)?;
         let mut left = at;
@@ -58,7 +58,7 @@ fn killed_at_any_disk_operation_the_folder_holds_the_old_or_the_new_set() -> Res
         } else {
             (Vec::new(), set("new"))
         };
-        let done = lock.write_until(&parts, &files, &mut || {
+        let done = lock.write_until(&parts, &files, None, &mut || {
             left -= 1;
             left < 0
         });
@@ -72,7 +72,7 @@ fn killed_at_any_disk_operation_the_folder_holds_the_old_or_the_new_set() -> Res
             news += 1;
         }
         // The next set removes what a kill left.
-        OutputLock::new(&folder)?.write_set(&[], &set("next"))?;
+        OutputLock::new(&folder)?.write_set(&[], &set("next"), &Inputs::default())?;
         assert_eq!(
             (set_in(&folder).as_deref(), leftovers(&folder)),
             (Some("next"), vec![]),
@@ -94,11 +94,11 @@ fn a_move_that_fails_anywhere_is_undone() -> Result<(), Error> {
     let mut taken_back = 0;
     for at in 0..40 {
         let folder = scratch.0.join(format!("{at}"));
-        OutputLock::new(&folder)?.write_set(&[], &set("old"))?;
+        OutputLock::new(&folder)?.write_set(&[], &set("old"), &Inputs::default())?;
         let mut left = at;
         let new = [set("new"), vec![("only-new.svg", b"new".to_vec())]].concat();
         let lock = OutputLock::new(&folder)?;
-        let _ = lock.write_until(&[], &new, &mut || {
+        let _ = lock.write_until(&[], &new, None, &mut || {
             left -= 1;
             left < 0
         });
@@ -137,7 +137,7 @@ fn two_commands_cannot_lock_one_folder_but_shards_can() -> Result<(), Error> {
 #[test]
 fn a_staged_file_is_removed_with_the_lock() -> Result<(), Error> {
     let scratch = Scratch::new("begun");
-    OutputLock::new(&scratch.0)?.write_set(&[], &set("old"))?;
+    OutputLock::new(&scratch.0)?.write_set(&[], &set("old"), &Inputs::default())?;
     let lock = OutputLock::new(&scratch.0)?;
     lock.stage_file(NAMES[0])?.write_all(b"half").map_err(|e| failed(&scratch.0, e))?;
     assert_eq!(leftovers(&scratch.0), [NEW]);
@@ -149,7 +149,7 @@ fn a_staged_file_is_removed_with_the_lock() -> Result<(), Error> {
 #[test]
 fn a_changed_file_is_reported() -> Result<(), Error> {
     let scratch = Scratch::new("changed");
-    OutputLock::new(&scratch.0)?.write_set(&[], &set("old"))?;
+    OutputLock::new(&scratch.0)?.write_set(&[], &set("old"), &Inputs::default())?;
     assert!(verify_manifest(&scratch.0, &NAMES).is_ok());
     fs::write(scratch.0.join(NAMES[1]), "other").map_err(|e| failed(&scratch.0, e))?;
     let message = verify_manifest(&scratch.0, &NAMES).expect_err("b.json is another").to_string();
@@ -162,13 +162,13 @@ fn a_set_of_another_command_is_refused_and_the_folder_is_unchanged() -> Result<(
     let scratch = Scratch::new("other-command");
     let run: Vec<(&'static str, Vec<u8>)> =
         ["report.html", "score.json"].map(|name| (name, b"of the run".to_vec())).to_vec();
-    OutputLock::new(&scratch.0)?.write_set(&[], &run)?;
+    OutputLock::new(&scratch.0)?.write_set(&[], &run, &Inputs::default())?;
     let enhanced: Vec<(&'static str, Vec<u8>)> =
         ["report.html", "enhance.json"].map(|name| (name, b"enhanced".to_vec())).to_vec();
-    let refused = OutputLock::new(&scratch.0)?.write_set(&[], &enhanced);
+    let refused = OutputLock::new(&scratch.0)?.write_set(&[], &enhanced, &Inputs::default());
     let message = refused.expect_err("the folder holds a run").to_string();
     assert!(message.contains("stylet run") && message.contains("--out"), "{message}");
     verify_manifest(&scratch.0, &["report.html", "score.json"])?;
     // The same command replaces its own results.
-    OutputLock::new(&scratch.0)?.write_set(&[], &run)
+    OutputLock::new(&scratch.0)?.write_set(&[], &run, &Inputs::default())
 }

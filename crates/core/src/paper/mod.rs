@@ -240,7 +240,8 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
         self.out.restarted = false;
         self.out.used = flags.used();
         if !flags.used() {
-            let why = if sample.is_usable() { UnusedReason::NotLater } else { UnusedReason::of_values(&sample) };
+            let why =
+                if sample.is_usable() { UnusedReason::NotLater } else { UnusedReason::of_values(&sample) };
             self.out.unused_reason = Some(why);
             return;
         }

@@ -219,6 +219,9 @@ fn failures_by_quantity<T: TrialTable + ?Sized>(
     Ok(section)
 }
 
+/// Title of [`failure_map_svg`].
+pub const MAP_TITLE: &str = "Where the algorithm fails";
+
 /// The map of failure rates as SVG: one row per drawn quantity, one column per tenth of its values.
 #[must_use]
 pub fn failure_map_svg(rows: &[FailureMapRow]) -> String {
@@ -233,7 +236,7 @@ pub fn failure_map_svg(rows: &[FailureMapRow]) -> String {
     heat_map(
         &map,
         &FigureOptions {
-            title: "Where the algorithm fails".to_owned(),
+            title: MAP_TITLE.to_owned(),
             subtitle: "insertions with a missed or false rupture, in %; blank: none".to_owned(),
             ..FigureOptions::default()
         },

@@ -34,6 +34,7 @@ fn every_output_is_a_column() {
         low_n: vec![9.0],
         high_n: vec![10.0],
         state: vec![State::ExpectedRupture],
+        unused_reason: vec![None],
         ..Trace::default()
     };
     assert_eq!(trace, expected);

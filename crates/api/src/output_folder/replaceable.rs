@@ -1,0 +1,150 @@
+//! Which existing files an output may replace: those that Stylet wrote, and never an input.
+
+use super::{Inputs, MANIFEST, Manifest, sum, sum_of_file};
+use crate::error::Error;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Files of each command, by its result file; checked before a long computation. The set itself is checked when it is written.
+const FILES: [(&str, &[&str]); 9] = [
+    ("score.json", &["recording.csv", "score.json", "scenario.ron", "figure.svg", "report.html"]),
+    ("enhance.json", &["enhance.json", "events.json", "figure.svg", "report.html", "enhanced.csv"]),
+    ("diagnosis.json", &["report.html", "diagnosis.json", "figure.svg", "extended.ron", "gain.svg"]),
+    ("predict.json", &["report.html", "predict.json"]),
+    ("identifiability.json", &["report.html", "identifiability.json", "matrix.svg"]),
+    (
+        "summary.json",
+        &["scenario.ron", "sweep.ron", "summary.json", "report.html", "trials.csv", "trials.parquet"],
+    ),
+    ("compare.json", &["compare.json", "report.html"]),
+    ("claims.json", &["claims.json", "switches.json", "index.html"]),
+    ("cases.json", &["table.txt", "cases.json", "table.json", "report.html"]),
+];
+
+/// A file that no manifest lists.
+const NOT_LISTED: &str = "is not a file that Stylet wrote (no manifest.json lists it)";
+/// A manifest of another program.
+const OTHER_MANIFEST: &str = "is not a manifest of Stylet";
+/// An input.
+const INPUT: &str = "is an input of this command";
+
+/// Content of a new file, as far as it is known.
+pub(super) enum Content<'a> {
+    Bytes(&'a [u8]),
+    Sha256(&'a str),
+    Unknown,
+}
+
+impl Content<'_> {
+    fn is_that_of(&self, path: &Path) -> bool {
+        match self {
+            Self::Bytes(bytes) => sum_of_file(path).is_ok_and(|found| found == sum(bytes)),
+            Self::Sha256(expected) => sum_of_file(path).is_ok_and(|found| found == *expected),
+            Self::Unknown => false,
+        }
+    }
+}
+
+/// Refuses an output folder in which this command, known by its result file, would replace foreign files or its inputs.
+///
+/// # Errors
+/// [`Error::NotReplaced`] with the first such file; [`Error::OtherInput`] for a folder named after another input.
+pub fn check_folder(folder: &Path, result_file: &str, inputs: &Inputs) -> Result<(), Error> {
+    if let Some(input) = &inputs.names_folder {
+        check_same_input(folder, &comparable(input))?;
+    }
+    let names = FILES.iter().find(|(result, _)| *result == result_file).map_or(&[][..], |(_, names)| names);
+    // An input that is an old file of the set may be what the new one repeats, which is only known later.
+    let inputs: Vec<_> = inputs.files.iter().filter(|input| !is_listed(folder, input)).collect();
+    check_files(folder, &inputs, names.iter().map(|name| (*name, Content::Unknown)))
+}
+
+fn is_listed(folder: &Path, input: &Path) -> bool {
+    let manifest = read_manifest(folder).ok().flatten().unwrap_or_default();
+    manifest.sha256.keys().any(|name| is_same(&folder.join(name), input))
+}
+
+/// As [`check_folder`], for files with known content: a file that would not change is no obstacle.
+pub(super) fn check_files<'a>(
+    folder: &Path,
+    inputs: &[impl AsRef<Path>],
+    files: impl Iterator<Item = (&'a str, Content<'a>)>,
+) -> Result<(), Error> {
+    let manifest = read_manifest(folder)?.unwrap_or_default();
+    for (name, content) in files {
+        let path = folder.join(name);
+        let why = if inputs.iter().any(|input| is_same(&path, input.as_ref())) {
+            INPUT
+        } else if manifest.sha256.contains_key(name) || fs::symlink_metadata(&path).is_err() {
+            continue;
+        } else {
+            NOT_LISTED
+        };
+        if !path.is_dir() && !content.is_that_of(&path) {
+            return Err(Error::NotReplaced { path: path.display().to_string(), why });
+        }
+    }
+    Ok(())
+}
+
+/// The manifest of a folder; `None` without one.
+fn read_manifest(folder: &Path) -> Result<Option<Manifest>, Error> {
+    let path = folder.join(MANIFEST);
+    let Ok(text) = fs::read(&path) else { return Ok(None) };
+    let foreign = |_| Error::NotReplaced { path: path.display().to_string(), why: OTHER_MANIFEST };
+    serde_json::from_slice(&text).map(Some).map_err(foreign)
+}
+
+/// The same existing file, by any path.
+pub(super) fn is_same(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Refuses a default folder that holds the results for another input than `input`.
+///
+/// # Errors
+/// [`Error::OtherInput`].
+pub(super) fn check_same_input(folder: &Path, input: &str) -> Result<(), Error> {
+    match read_manifest(folder)?.and_then(|manifest| manifest.input) {
+        Some(other) if other != input => {
+            Err(Error::OtherInput { path: folder.display().to_string(), input: other })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A path as it is kept in a manifest: without symbolic links, relative to the current folder where it lies below it.
+pub(super) fn comparable(input: &Path) -> String {
+    let full = input.canonicalize().unwrap_or_else(|_| input.to_path_buf());
+    let here = std::env::current_dir().and_then(|here| here.canonicalize()).unwrap_or_default();
+    let relative: PathBuf = full.strip_prefix(&here).map(Path::to_path_buf).unwrap_or(full);
+    relative.display().to_string()
+}
+
+/// Refuses to replace a file that is an input, or that `is_own` does not recognise as written by Stylet. A file that would not change is
+/// no obstacle.
+///
+/// # Errors
+/// [`Error::NotReplaced`].
+pub fn check_own_file(
+    path: &Path,
+    inputs: &[&Path],
+    content: Option<&[u8]>,
+    is_own: impl Fn(&[u8]) -> bool,
+) -> Result<(), Error> {
+    let Ok(found) = fs::symlink_metadata(path) else { return Ok(()) };
+    let refused = |why| Err(Error::NotReplaced { path: path.display().to_string(), why });
+    let is_input = inputs.iter().any(|input| is_same(path, input));
+    // Devices and pipes are written to, not replaced; writing to a folder fails with a message of its own.
+    if !is_input && !found.is_file() && !found.is_symlink() {
+        return Ok(());
+    }
+    let bytes = fs::read(path).unwrap_or_default();
+    if content.is_some_and(|content| content == bytes) {
+        return Ok(());
+    }
+    if is_input {
+        return refused(INPUT);
+    }
+    if is_own(&bytes) { Ok(()) } else { refused("exists, and is not recognised as a file that Stylet wrote") }
+}

@@ -1,0 +1,174 @@
+//! `stylet listen`: the online core on a live stream of samples.
+
+mod outputs;
+mod reporter;
+mod udp_receiver;
+
+use crate::cli::args::ListenArgs;
+use crate::cli::exit_codes::Failure;
+use crate::cli::terminal_output::print_error;
+use outputs::{Forwarder, Printer};
+use reporter::Reporter;
+use std::io::Read;
+use std::net::TcpListener;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
+use std::time::{Duration, Instant};
+use stylet_api::live_stream::{Broadcast, LineSplitter, PageServer, Session, StreamCounts};
+use stylet_scenario::EnhancerConfigFile;
+use udp_receiver::{Received, UdpReceiver};
+
+/// Longest time without a look at the clock and at signals.
+const POLL_INTERVAL: Duration = Duration::from_millis(100);
+/// Longest time after a signal for printing the last lines.
+const LAST_LINES_TIMEOUT: Duration = Duration::from_secs(2);
+/// Bytes of standard input that are read at once, and pieces that may wait.
+const PIECE_BYTES: usize = 1 << 16;
+const WAITING_PIECES: usize = 16;
+/// Exit code after a second signal: 128 and the number of SIGINT.
+const INTERRUPTED_AGAIN: i32 = 130;
+
+/// When to end: a signal, an output that has failed, or the duration.
+struct End {
+    requested: Arc<AtomicBool>,
+    at: Option<Instant>,
+}
+
+impl End {
+    fn new(duration_s: Option<f64>) -> Result<Self, Failure> {
+        let requested = Arc::new(AtomicBool::new(false));
+        let flag = requested.clone();
+        let handler = move || {
+            if flag.swap(true, Ordering::AcqRel) {
+                std::process::exit(INTERRUPTED_AGAIN);
+            }
+        };
+        ctrlc::set_handler(handler).map_err(Failure::internal)?;
+        Ok(Self { requested, at: duration_s.map(|s| Instant::now() + Duration::from_secs_f64(s)) })
+    }
+
+    fn is_requested(&self) -> bool {
+        self.requested.load(Ordering::Acquire)
+    }
+
+    fn is_reached(&self) -> bool {
+        self.is_requested() || self.at.is_some_and(|at| Instant::now() >= at)
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits; the summary is printed all the same.
+pub fn listen(args: &ListenArgs) -> Result<(), Failure> {
+    let config = args.config.as_deref().map(EnhancerConfigFile::load).transpose()?.unwrap_or_default();
+    let broadcast = Arc::new(Broadcast::default());
+    let mut session = Session::new(&config, broadcast.clone());
+    let mut receiver = args.udp.map(|port| UdpReceiver::bind(&args.host, port)).transpose()?;
+    let forwarder = match &args.forward {
+        Some(to) => Some(Forwarder::start(&broadcast, to, receiver.as_ref().and_then(UdpReceiver::address))?),
+        None => None,
+    };
+    let mut refused_readers = None;
+    if let Some(port) = args.page {
+        let bind = |why: std::io::Error| Failure::Check(format!("--page {port}: cannot bind: {why}"));
+        let listener = TcpListener::bind((args.host.as_str(), port)).map_err(bind)?;
+        print_error(&format!("live page: http://{}/\n", listener.local_addr().map_err(bind)?));
+        let server = PageServer::new(listener, &args.host, broadcast.clone());
+        refused_readers = Some(server.refused());
+        std::thread::Builder::new().spawn(move || server.serve()).map_err(bind)?;
+    }
+    let end = End::new(args.duration_s)?;
+    let only_printed = args.page.is_none() && args.forward.is_none();
+    let printer = match args.quiet {
+        true => None,
+        false => Some(Printer::start(&broadcast, only_printed.then(|| end.requested.clone()))?),
+    };
+    let mut reporter = Reporter::default();
+    let read = match &mut receiver {
+        Some(receiver) => read_udp(receiver, &mut session, &broadcast, &mut reporter, &end),
+        None => read_stdin(&mut session, &broadcast, &mut reporter, &end),
+    };
+    broadcast.close();
+    let wait = end.is_requested().then_some(LAST_LINES_TIMEOUT);
+    let printed = printer.map_or(Ok(()), |printer| printer.finish(wait));
+    let counts = StreamCounts {
+        dropped_by_system: receiver.as_ref().map_or(Some(0), UdpReceiver::dropped),
+        refused_readers: refused_readers.map_or(0, |count| count.load(Ordering::Relaxed)),
+        not_forwarded: forwarder.map_or(0, |forwarder| forwarder.finish(wait)),
+        ..session.counts()
+    };
+    let json = serde_json::to_string(&counts).map_err(Failure::internal)?;
+    print_error(&format!("{json}\n"));
+    read.and(printed)
+}
+
+fn read_udp(
+    receiver: &mut UdpReceiver,
+    session: &mut Session,
+    broadcast: &Broadcast,
+    reporter: &mut Reporter,
+    end: &End,
+) -> Result<(), Failure> {
+    while !end.is_reached() {
+        match receiver.receive()? {
+            Received::Datagram(bytes) if bytes.trim_ascii() == b"end" => break,
+            Received::Datagram(bytes) => {
+                session.process_datagram(bytes, Instant::now(), &mut |report| reporter.print(&report));
+            }
+            Received::Nothing => broadcast.flush(),
+        }
+    }
+    Ok(())
+}
+
+/// A piece of standard input and the time of its arrival.
+type Piece = std::io::Result<(Vec<u8>, Instant)>;
+
+fn read_stdin(
+    session: &mut Session,
+    broadcast: &Broadcast,
+    reporter: &mut Reporter,
+    end: &End,
+) -> Result<(), Failure> {
+    let failed = |why: std::io::Error| Failure::Check(format!("standard input: {why}"));
+    // A read of standard input cannot be interrupted; the thread ends with the program.
+    let (sender, pieces) = sync_channel(WAITING_PIECES);
+    std::thread::Builder::new().spawn(move || send_pieces(&sender)).map_err(failed)?;
+    let mut splitter = LineSplitter::default();
+    let mut report = |report| reporter.print(&report);
+    let mut outcome = Ok(());
+    while !end.is_reached() {
+        match pieces.recv_timeout(POLL_INTERVAL) {
+            Ok(Ok((piece, arrived))) => {
+                splitter.push(&piece, |line| session.process_line(line, arrived, &mut report));
+            }
+            Ok(Err(why)) => {
+                outcome = Err(failed(why));
+                break;
+            }
+            Err(RecvTimeoutError::Timeout) => broadcast.flush(),
+            Err(RecvTimeoutError::Disconnected) => break,
+        }
+    }
+    splitter.finish(|line| session.process_line(line, Instant::now(), &mut report));
+    outcome
+}
+
+fn send_pieces(sender: &SyncSender<Piece>) {
+    let mut input = std::io::stdin().lock();
+    let mut buffer = vec![0; PIECE_BYTES];
+    loop {
+        let piece = match input.read(&mut buffer) {
+            Ok(0) => return,
+            Ok(count) => Ok((buffer[..count].to_vec(), Instant::now())),
+            Err(why) if why.kind() == std::io::ErrorKind::Interrupted => continue,
+            Err(why) => Err(why),
+        };
+        let last = piece.is_err();
+        if sender.send(piece).is_err() || last {
+            return;
+        }
+    }
+}
