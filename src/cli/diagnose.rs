@@ -38,7 +38,11 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let read = args.results.inputs(&args.scenario, args.data.iter().chain(&args.columns));
     check_folder(&folder, "diagnosis.json", &read)?;
     let progress = stage_printer(args.results.quiet, " ...");
-    let found = stylet_api::diagnose(&scenario, &inputs.read_recordings()?, progress)?;
+    let recordings = inputs.read_recordings()?;
+    let samples: Vec<f64> = recordings.iter().map(|r| r.recording.len() as f64).collect();
+    let estimate = resource_estimate::estimate_diagnose_samples(&samples);
+    args.limits.check(&args.scenario, &estimate, true)?;
+    let found = stylet_api::diagnose(&scenario, &recordings, progress)?;
     let output = found.output(&scenario, &inputs)?.with_inputs(read);
     args.results.write_and_print(&folder, &output, || summary(&found.diagnosis))
 }

@@ -51,6 +51,8 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
         args.limits.check(&args.data, &estimate, args.results.quiet)?;
     }
     let (recording, notes) = read_csv(&args.data, &options)?;
+    let estimate = resource_estimate::estimate_enhance_samples(recording.len() as f64, regressors.len());
+    args.limits.check(&args.data, &estimate, true)?;
     let result = enhance_recording(recording, notes, config, &regressors, model.as_ref())?;
     let summary = summary(args, &result);
     args.results.write_and_print(&folder, &result.output_files(&source)?.with_inputs(inputs), || summary)

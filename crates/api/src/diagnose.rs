@@ -2,7 +2,7 @@
 
 use crate::diagnosis_inputs::{DiagnosisInputs, INPUTS_FILE};
 use crate::error::Error;
-use crate::output_files::{OutputFiles, to_json_bytes};
+use crate::output_files::{OutputFiles, one_line, to_json_bytes};
 use stylet_diagnose::prediction::{PredictionResult, Refit};
 use stylet_diagnose::{Diagnosis, DiagnosisResult, NamedRecording, Options};
 use stylet_record::{QualityNote, assess, check_usable, downsample};
@@ -33,7 +33,8 @@ impl DiagnosisReport {
     /// [`Error::Internal`] when a value cannot be written.
     pub fn extended_ron(&self, assumed: &str) -> Result<String, Error> {
         Ok(format!(
-            "// {assumed} with re-fitted parameters and the effects found by stylet diagnose {}.\n{}",
+            "// {} with re-fitted parameters and the effects found by stylet diagnose {}.\n{}",
+            one_line(assumed),
             env!("CARGO_PKG_VERSION"),
             self.extended.to_ron().map_err(Error::internal)?
         ))

@@ -2,7 +2,7 @@
 
 use crate::diagnosis_inputs::DiagnosisInputs;
 use crate::error::Error;
-use crate::output_files::OutputFiles;
+use crate::output_files::{OutputFiles, one_line};
 use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -144,7 +144,8 @@ impl RepeatsReport {
         let Self { study, online } = self;
         let file = inputs.scenario.display();
         let ron = format!(
-            "// {file}: the model that stylet diagnose {} fitted, with the means of the per-recording parameters.\n{}",
+            "// {}: the model that stylet diagnose {} fitted, with the means of the per-recording parameters.\n{}",
+            one_line(&file.to_string()),
             env!("CARGO_PKG_VERSION"),
             study.mean_scenario.to_ron().map_err(Error::internal)?
         );

@@ -3,7 +3,7 @@
 use crate::diagnose::diagnose;
 use crate::diagnosis_inputs::DiagnosisInputs;
 use crate::error::Error;
-use crate::output_files::{OutputFiles, to_json_bytes};
+use crate::output_files::{OutputFiles, one_line, to_json_bytes};
 use crate::output_folder::{check_own_file, write_file_atomically};
 use std::path::Path;
 use stylet_diagnose::NamedRecording;
@@ -130,7 +130,7 @@ impl PlanReport {
         let motion = format!(
             "{MOTION_COMMENT} {}: a motion for `stylet run SCENARIO.ron --motion {}`.\n{}\n",
             env!("CARGO_PKG_VERSION"),
-            out.file_name().unwrap_or(out.as_os_str()).to_string_lossy(),
+            one_line(&out.file_name().unwrap_or(out.as_os_str()).to_string_lossy()),
             self.motion_ron()?
         );
         write_file_atomically(&out.with_extension("json"), &self.json()?)?;

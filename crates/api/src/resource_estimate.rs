@@ -90,12 +90,19 @@ pub fn estimate_sweep(sweep: &Sweep, threads: usize) -> ResourceEstimate {
 #[must_use]
 pub fn estimate_enhance(data: &Path, models: usize) -> Option<ResourceEstimate> {
     let samples = samples(data)?;
-    Some(ResourceEstimate {
-        description: format!("about {} samples", significant(samples, 2)),
+    let description = format!("about {} samples", significant(samples, 2));
+    Some(ResourceEstimate { description, ..estimate_enhance_samples(samples, models) })
+}
+
+/// As [`estimate_enhance`] for a number of samples, which for files of other programs and pipes is known once they are read.
+#[must_use]
+pub fn estimate_enhance_samples(samples: f64, models: usize) -> ResourceEstimate {
+    ResourceEstimate {
+        description: format!("{samples} samples"),
         memory_bytes: samples * (ENHANCE_BYTES + (models as f64 - 1.0) * MODEL_BYTES),
         duration_s: samples * SAMPLE_S * models as f64,
         remedy: "cut the recording to the insertion",
-    })
+    }
 }
 
 /// Estimate for `stylet enhance` when the recording is long enough to be streamed, else `None`.
@@ -110,10 +117,18 @@ pub fn estimate_long_enhance(data: &Path, models: usize) -> Option<ResourceEstim
 pub fn estimate_diagnose(data: &[PathBuf]) -> ResourceEstimate {
     let each: Vec<f64> = data.iter().filter_map(|path| samples(path)).collect();
     let all: f64 = each.iter().sum();
+    let description = format!("about {} samples in {} recording(s)", significant(all, 2), data.len());
+    ResourceEstimate { description, ..estimate_diagnose_samples(&each) }
+}
+
+/// As [`estimate_diagnose`] for the numbers of samples, which for files of other programs and pipes are known once they are read.
+#[must_use]
+pub fn estimate_diagnose_samples(each: &[f64]) -> ResourceEstimate {
+    let all: f64 = each.iter().sum();
     // Longer recordings are downsampled.
     let used: f64 = each.iter().map(|n| n.min(stylet_record::downsample::MAX_SAMPLES as f64)).sum();
     ResourceEstimate {
-        description: format!("about {} samples in {} recording(s)", significant(all, 2), data.len()),
+        description: format!("{all} samples in {} recording(s)", each.len()),
         memory_bytes: all * DIAGNOSE_BYTES,
         duration_s: used * DIAGNOSE_S,
         remedy: "cut the recordings to the insertion",
@@ -127,7 +142,7 @@ pub fn estimate_predict(data: &[PathBuf]) -> ResourceEstimate {
     ResourceEstimate { duration_s: need.duration_s * PREDICT_SHARE, ..need }
 }
 
-/// Number of samples of a CSV file, from its size and the length of its first lines; `None` unless it is a plain file.
+/// Number of samples of a text file, from its size and the length of its first lines; `None` unless it is a plain file of text.
 fn samples(path: &Path) -> Option<f64> {
     use std::io::Read as _;
     const HEAD: u64 = 1 << 16;
@@ -135,6 +150,9 @@ fn samples(path: &Path) -> Option<f64> {
     let size = file.metadata().ok().filter(std::fs::Metadata::is_file)?.len();
     let mut head = Vec::new();
     file.take(HEAD).read_to_end(&mut head).ok()?;
+    if head.contains(&0) {
+        return None;
+    }
     let lines = head.iter().filter(|b| **b == b'\n').count().max(1);
     Some(size as f64 * lines as f64 / head.len().max(1) as f64)
 }

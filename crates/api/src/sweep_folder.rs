@@ -81,6 +81,11 @@ pub fn run_all_shards(
     all.finish()
 }
 
+/// A failure after which finished shards remain in the folder.
+fn shards_kept(out: &Path, why: std::io::Error) -> Error {
+    shard::ShardError::Write { path: out.display().to_string(), why }.into()
+}
+
 /// Collects the rows of the shards in order.
 struct Gathered<'a> {
     out: &'a Path,
@@ -89,16 +94,16 @@ struct Gathered<'a> {
 
 impl<'a> Gathered<'a> {
     fn new(columns: &Columns, out: &'a Path) -> Result<Self, Error> {
-        let rows = TrialTableWriter::new(out, columns).map_err(|why| Error::output(out, why))?;
+        let rows = TrialTableWriter::new(out, columns).map_err(|why| shards_kept(out, why))?;
         Ok(Self { out, rows })
     }
 
     fn take(&mut self, rows: &[TrialRow]) -> Result<(), Error> {
-        rows.iter().try_for_each(|row| self.rows.push(row)).map_err(|why| Error::output(self.out, why))
+        rows.iter().try_for_each(|row| self.rows.push(row)).map_err(|why| shards_kept(self.out, why))
     }
 
     fn finish(self) -> Result<DiskTrialTable, Error> {
-        self.rows.finish().map_err(|why| Error::output(self.out, why))
+        self.rows.finish().map_err(|why| shards_kept(self.out, why))
     }
 }
 
@@ -145,8 +150,12 @@ pub fn write_results(
     (lock, out): (&OutputLock, &Path),
     inputs: Inputs,
 ) -> Result<Summary, Error> {
-    let (output, summary) = write_result_files(sweep, columns, rows, lock)?;
-    output.with_inputs(inputs).write_locked(lock)?;
+    let written = write_result_files(sweep, columns, rows, lock)
+        .and_then(|(output, summary)| output.with_inputs(inputs).write_locked(lock).map(|()| summary));
+    let summary = written.map_err(|error| match error {
+        Error::Output { why, .. } => shards_kept(out, why),
+        other => other,
+    })?;
     shard::remove_all(out);
     Ok(summary)
 }

@@ -2,7 +2,7 @@
 
 use crate::load_ron::FieldError;
 use crate::motion::{Motion, Segment};
-use crate::range_checks::{CheckResult, check, finite, positive};
+use crate::range_checks::{CheckResult, check, finite, positive, shown};
 use crate::scenario::Scenario;
 
 /// Larger numbers of samples or physics steps are refused as typing errors.
@@ -83,9 +83,10 @@ fn reaches(s: &Scenario) -> CheckResult {
     let (seconds, samples) = (plan.duration_s(), plan.duration_s() * s.sample_hz);
     if samples > MAX_SAMPLES {
         let what = format!(
-            "makes {samples:.3e} samples in {seconds} s at {} Hz; at most {MAX_SAMPLES:.0e} are simulated: \
+            "makes {samples:.3e} samples in {} s at {} Hz; at most {MAX_SAMPLES:.0e} are simulated: \
              shorten it or lower sample_hz",
-            s.sample_hz
+            shown(seconds),
+            shown(s.sample_hz)
         );
         return Err(FieldError::new("motion", what));
     }
@@ -95,9 +96,10 @@ fn reaches(s: &Scenario) -> CheckResult {
     }
     if seconds * s.physics_hz > MAX_PHYSICS_STEPS {
         let what = format!(
-            "is {}, which makes {:.3e} steps in {seconds} s; at most {MAX_PHYSICS_STEPS:.0e} are simulated: lower it",
-            s.physics_hz,
-            seconds * s.physics_hz
+            "is {}, which makes {:.3e} steps in {} s; at most {MAX_PHYSICS_STEPS:.0e} are simulated: lower it",
+            shown(s.physics_hz),
+            seconds * s.physics_hz,
+            shown(seconds)
         );
         return Err(FieldError::new("physics_hz", what));
     }

@@ -1,13 +1,18 @@
 //! Ranges of a scenario's values.
 
 use crate::load_ron::FieldError;
-use crate::range_checks::{CheckResult, check, finite, not_negative, positive};
+use crate::range_checks::{CheckResult, check, finite, plausible, positive};
 use crate::scenario::Scenario;
 use crate::sensor_config::{ForceTorque, Sensor};
 use crate::validate_arm;
 use crate::validate_effects::effects;
 use crate::validate_enhancer::enhance;
 use crate::validate_motion::motion;
+
+/// Largest stiffness in N/m and friction in N s/m² of a layer; a block of steel of a needle's size has 1e9 N/m.
+const MAX_COEFFICIENT: f64 = 1e9;
+/// Largest force in N, as for measured samples.
+const MAX_FORCE_N: f64 = 1e6;
 
 impl Scenario {
     /// Checks the range of every value.
@@ -64,10 +69,11 @@ fn tissue(s: &Scenario) -> CheckResult {
             layer.thickness_m <= 1.0,
             "a layer is at most 1 m thick; is this in millimetres?",
         )?;
-        not_negative(at("stiffness_n_per_m"), layer.stiffness_n_per_m, "N/m")?;
-        not_negative(at("friction_ns_per_m2"), layer.friction_ns_per_m2, "N s/m²")?;
+        plausible(at("stiffness_n_per_m"), layer.stiffness_n_per_m, MAX_COEFFICIENT, "N/m")?;
+        plausible(at("friction_ns_per_m2"), layer.friction_ns_per_m2, MAX_COEFFICIENT, "N s/m²")?;
         if let Some(force) = layer.puncture_n {
             positive(at("puncture_n"), force, "N")?;
+            plausible(at("puncture_n"), force, MAX_FORCE_N, "N")?;
         }
     }
     Ok(())
@@ -85,11 +91,11 @@ fn sensors(sensor: &Sensor, physics_hz: f64) -> CheckResult {
 }
 
 fn force_torque(at: &str, c: &ForceTorque) -> CheckResult {
-    not_negative(format!("{at}.noise_n"), c.noise_n, "N")?;
+    plausible(format!("{at}.noise_n"), c.noise_n, MAX_FORCE_N, "N")?;
     check(format!("{at}.ar1"), c.ar1, c.ar1 > -1.0 && c.ar1 < 1.0, "it must lie between -1 and 1")?;
     finite(format!("{at}.bias_n"), c.bias_n, "N")?;
     finite(format!("{at}.drift_n_per_s"), c.drift_n_per_s, "N/s")?;
-    not_negative(format!("{at}.quantisation_n"), c.quantisation_n, "N")?;
+    plausible(format!("{at}.quantisation_n"), c.quantisation_n, MAX_FORCE_N, "N")?;
     match c.range_n {
         Some(range) => positive(format!("{at}.range_n"), range, "N"),
         None => Ok(()),

@@ -281,9 +281,7 @@ pub fn baseline_changes(old: &Baseline, new: &Baseline) -> Vec<String> {
 /// The results as JUnit XML, one test case per bound.
 #[must_use]
 pub fn junit_xml(judged: &[GateResult]) -> String {
-    let escape = |text: &str| {
-        text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-    };
+    let escape = escape_xml;
     let failures = judged.iter().filter(|j| !j.passed).count();
     let mut xml = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n  <testsuite name=\"stylet gate\" tests=\"{}\" failures=\"{failures}\">\n",
@@ -303,6 +301,25 @@ pub fn junit_xml(judged: &[GateResult]) -> String {
     }
     xml.push_str("  </testsuite>\n</testsuites>\n");
     xml
+}
+
+/// A text as an attribute of XML 1.0, which has no form for most control characters: they become U+FFFD.
+fn escape_xml(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\t' => out.push_str("&#9;"),
+            '\n' => out.push_str("&#10;"),
+            '\r' => out.push_str("&#13;"),
+            c if c.is_control() || matches!(c, '\u{fffe}' | '\u{ffff}') => out.push('\u{fffd}'),
+            c => out.push(c),
+        }
+    }
+    out
 }
 
 /// A bound and its result in one line.

@@ -110,6 +110,9 @@ pub struct RunShardArgs {
     /// Keep a complete shard of this sweep as it is.
     #[arg(long)]
     pub resume: bool,
+    /// Print nothing but errors.
+    #[arg(long, short)]
+    pub quiet: bool,
 }
 
 /// Arguments of `stylet sweep merge`.

@@ -152,6 +152,10 @@ fn read_stdin(
             Err(RecvTimeoutError::Disconnected) => break,
         }
     }
+    // What had arrived before a signal.
+    for (piece, arrived) in pieces.try_iter().take(WAITING_PIECES).flatten() {
+        splitter.push(&piece, |line| session.process_line(line, arrived, &mut report));
+    }
     splitter.finish(|line| session.process_line(line, Instant::now(), &mut report));
     outcome
 }

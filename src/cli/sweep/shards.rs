@@ -48,7 +48,18 @@ pub fn run_shard(args: &RunShardArgs) -> Result<(), Failure> {
     let (sweep, columns) = load(&args.selection)?;
     let out = args.out.clone().unwrap_or_else(|| default_folder(&args.selection.sweep, ""));
     let work = || write_shard(&sweep, &columns, args.shard, &out, args.resume);
-    Ok(with_threads(args.threads.unwrap_or(0), work)??)
+    with_threads(args.threads.unwrap_or(0), work)??;
+    if args.quiet {
+        return Ok(());
+    }
+    let range = args.shard.range(sweep.trials());
+    let path = args.shard.path(&out);
+    crate::cli::terminal_output::print(&format!(
+        "{}: trials {} to {}\n",
+        path.display(),
+        range.start,
+        range.end
+    ))
 }
 
 /// `stylet sweep merge`.
