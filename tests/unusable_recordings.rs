@@ -308,3 +308,53 @@ fn layers_are_accepted_up_to_the_stated_limit() {
     assert_eq!(over.status.code(), Some(2), "{}", flat(&over));
     assert!(flat(&over).contains("41 layers") && flat(&over).contains("up to 40"), "{}", flat(&over));
 }
+
+/// Positions of the other sign, a retraction alone, the same recording under two names, and time in other units.
+#[test]
+fn recordings_that_a_search_would_misread_are_refused_before_it() {
+    let scratch = Scratch::new("misread");
+    let assumed = text(&scratch.file("assumed.ron", ASSUMED));
+    let rows = simulated(&scratch, 1);
+    let scaled = |time: f64, position: f64| rows.iter().map(move |[t, z, f]| [t * time, z * position, *f]);
+    let retraction: Vec<Row> = rows.iter().filter(|r| r[0] > 4.1).copied().collect();
+    let cases = [
+        ("other_sign", csv(scaled(1.0, -1.0)), "scale: -1"),
+        ("retraction", csv(retraction), "only retracts"),
+        ("ms", csv(scaled(1e3, 1.0)), "milliseconds"),
+        ("us", csv(scaled(1e6, 1.0)), "microseconds"),
+        ("minutes", csv(scaled(1.0 / 60.0, 1.0)), "minutes"),
+    ];
+    for (name, rows, remedy) in cases {
+        let file = text(&scratch.file(&format!("{name}.csv"), &rows));
+        let out = text(&scratch.path().join(name));
+        let output = stylet(&["diagnose", &assumed, "--out", &out, "--data", &file]);
+        assert_eq!(output.status.code(), Some(2), "{name}: {}", flat(&output));
+        assert!(flat(&output).contains(remedy), "{name}: {}", flat(&output));
+        assert!(!Path::new(&out).exists(), "{name}");
+    }
+    let (a, b) = (scratch.file("a.csv", &csv(rows.clone())), scratch.file("b.csv", &csv(rows)));
+    let (a, b) = (text(&a), text(&b));
+    for flags in [&["--data", &a, &a][..], &["--data", &a, &b], &["--repeats", "--data", &a, &b, &a]] {
+        let mut all = vec!["diagnose", &assumed];
+        all.extend(flags);
+        let output = stylet(&all);
+        assert_eq!(output.status.code(), Some(2), "{flags:?}: {}", flat(&output));
+        assert!(flat(&output).contains("holds the samples of"), "{flags:?}: {}", flat(&output));
+    }
+}
+
+#[test]
+fn a_diagnosis_is_stopped_at_its_time_limit_and_writes_nothing() {
+    let scratch = Scratch::new("time-limit");
+    let assumed = text(&scratch.file("assumed.ron", ASSUMED));
+    let file = text(&scratch.file("a.csv", &csv(simulated(&scratch, 1))));
+    let out = text(&scratch.path().join("out"));
+    // The forecast for these samples is below the limit, which no diagnosis meets.
+    let long = "0.0000001h";
+    let output = stylet(&["diagnose", &assumed, "--out", &out, "--limit-time", long, "--data", &file]);
+    assert_eq!(output.status.code(), Some(2), "{}", flat(&output));
+    assert!(flat(&output).contains("--limit-time"), "{}", flat(&output));
+    assert!(!Path::new(&out).exists());
+    let output = stylet(&["diagnose", &assumed, "--out", &out, "--limit-time", "10min", "--data", &file]);
+    assert!(output.status.success() && Path::new(&out).exists(), "{}", flat(&output));
+}

@@ -7,7 +7,9 @@ use std::fmt::Write as _;
 use stylet_api::output_folder::{check_folder, recover_parent};
 use stylet_api::resource_estimate;
 use stylet_diagnose::Diagnosis;
-use stylet_report::pages::diagnosis::{recording_differences, summary_sentence};
+use stylet_report::pages::diagnosis::{
+    findings, general_forms, lower_limits, partial_model, recording_differences, summary_sentence,
+};
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 
@@ -42,7 +44,9 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let samples: Vec<f64> = recordings.iter().map(|r| r.recording.len() as f64).collect();
     let estimate = resource_estimate::estimate_diagnose_samples(&samples);
     args.limits.check(&args.scenario, &estimate, true)?;
+    let limit = args.limits.start_time_limit(&args.scenario);
     let found = stylet_api::diagnose(&scenario, &recordings, progress)?;
+    drop(limit);
     let output = found.output(&scenario, &inputs)?.with_inputs(read);
     args.results.write_and_print(&folder, &output, || summary(&found.diagnosis))
 }
@@ -52,38 +56,54 @@ fn summary(d: &Diagnosis) -> String {
     let _ = writeln!(out, "{}", summary_sentence(d));
     for c in &d.causes {
         let _ = writeln!(out, "\n  {}, confidence {}", c.effect, significant(c.confidence, 3));
+        if let Some(remark) = &c.remark {
+            let _ = writeln!(out, "    {remark}");
+        }
         for (path, e) in &c.parameters {
             let _ = writeln!(
                 out,
-                "    {path} = {} (95 %: {} to {})",
+                "    {path} = {} (95 %: {} to {}){}",
                 significant(e.value, 4),
                 significant(e.low, 4),
-                significant(e.high, 4)
+                significant(e.high, 4),
+                if c.at_bound.contains(path) { ", at its bound" } else { "" }
             );
         }
         if !c.equivalent.is_empty() {
             let _ = writeln!(out, "    equivalent: {}", c.equivalent.join(", "));
+        }
+        if let Some(sentence) = general_forms(c) {
+            let _ = writeln!(out, "    {sentence}");
         }
     }
     let g = &d.gain;
     let what = if g.held_out { "on held-out recordings" } else { "on the one recording, which was fitted" };
     let _ = writeln!(
         out,
-        "\n  residual {what}: {} N before, {} N after, noise {} N",
+        "\n  residual {what}: {} N before, {} N after{}, noise {} N",
         significant(g.rmse_before_n, 3),
         significant(g.rmse_after_n, 3),
+        if g.rmse_given_scatter_n < 0.9 * g.rmse_after_n {
+            format!(
+                " ({} N with each recording's own ruptures, surface and friction)",
+                significant(g.rmse_given_scatter_n, 3)
+            )
+        } else {
+            String::new()
+        },
         significant(g.floor_n, 3)
     );
+    for sentence in findings(d) {
+        let _ = writeln!(out, "  {sentence}");
+    }
+    if let Some(sentence) = partial_model(d) {
+        let _ = writeln!(out, "  {sentence}");
+    }
+    for sentence in lower_limits(d) {
+        let _ = writeln!(out, "  {sentence}");
+    }
     if let Some(differ) = recording_differences(d) {
         let _ = writeln!(out, "  {differ}");
-    }
-    if d.residual_structure.p_value < 1e-3 {
-        let _ = writeln!(
-            out,
-            "  the residual still depends on {} ({})",
-            d.residual_structure.depends_on.join(", "),
-            stylet_report::p_value(d.residual_structure.p_value)
-        );
     }
     let imitated = d.negligible.iter().filter(|t| t.reason == stylet_diagnose::REASON_IMITATES_UNMODELLED);
     let imitated: Vec<&str> = imitated.map(|t| t.effect.as_str()).collect();

@@ -22,18 +22,26 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let (inputs, results) = (args.inputs(), &args.results);
     let set = load_data_set(&inputs)?;
     let files = recording_files(&set, &args.data)?;
-    args.limits.check(&args.scenario, &resource_estimate::estimate_diagnose(&files), results.quiet)?;
+    let estimate = if set.split_by.is_empty() {
+        resource_estimate::estimate_diagnose_repeats(&files)
+    } else {
+        resource_estimate::estimate_diagnose(&files)
+    };
+    args.limits.check(&args.scenario, &estimate, results.quiet)?;
     let folder = results.output_folder(&args.scenario, "-diagnosis");
     let read = results.inputs(&args.scenario, files.iter().chain(&args.columns));
     check_folder(&folder, "diagnosis.json", &read)?;
+    let limit = args.limits.start_time_limit(&args.scenario);
     let runs = set.load_recordings(&files, set.tissue.layers.len())?;
     if !set.split_by.is_empty() {
         let found = diagnose_specimens(&set, &runs)?;
+        drop(limit);
         let output = found.output(&set, &inputs)?.with_inputs(read);
         return results.write_and_print(&folder, &output, || specimens_summary(&found));
     }
     let mut progress = stage_printer(results.quiet, "");
     let found = diagnose_repeats(&set, &runs, !args.data.is_empty(), &mut progress)?;
+    drop(limit);
     results.write_and_print(&folder, &found.output(&set, &inputs)?.with_inputs(read), || {
         format!("{}{}", summary(&found.study), online_enhancement::summary(&found.online))
     })
@@ -61,10 +69,11 @@ fn summary(study: &SetDiagnosis) -> String {
         let _ = writeln!(out, "    {line}");
     }
     for c in &d.causes {
-        let _ = writeln!(out, "\n  {}", c.effect);
+        let _ = writeln!(out, "\n  {}, confidence {}", c.effect, significant(c.confidence, 3));
         for (path, e) in &c.parameters {
             let (value, low, high) = (significant(e.value, 4), significant(e.low, 3), significant(e.high, 3));
-            let _ = writeln!(out, "    {path} = {value} (95 %: {low} to {high})");
+            let bound = if c.at_bound.contains(path) { ", at its bound" } else { "" };
+            let _ = writeln!(out, "    {path} = {value} (95 %: {low} to {high}){bound}");
         }
     }
     let _ = writeln!(

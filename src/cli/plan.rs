@@ -40,8 +40,10 @@ pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
     let mut read = vec![inputs.scenario.as_path(), args.limits.as_path()];
     read.extend(inputs.data.iter().chain(&inputs.columns).map(PathBuf::as_path));
     check_plan_files(&out, &read)?;
+    let limit = args.resources.start_time_limit(&inputs.scenario);
     let progress = stage_printer(args.quiet, " ...");
     let report = stylet_api::plan_insertion::plan(&inputs, (&args.limits, &limits), !args.quick, &progress)?;
+    drop(limit);
     check_plan_files(&out, &read)?;
     report.write(&out)?;
     if args.quiet {
@@ -69,6 +71,10 @@ fn summary(plan: &Plan) -> String {
         1e3 * plan.depth_m,
         significant(plan.force_n, 3)
     );
+    if !plan.already_named.is_empty() {
+        let _ =
+            writeln!(out, "  already named, and part of every candidate: {}", plan.already_named.join(", "));
+    }
     if pairs.is_empty() {
         let _ = writeln!(
             out,
@@ -86,7 +92,8 @@ fn summary(plan: &Plan) -> String {
     } else {
         let _ = writeln!(
             out,
-            "  the next diagnosis names the right single cause with probability {} (now {}), by {}",
+            "  the next diagnosis decides which {}cause there is, if any, with probability {} (now {}), by {}",
+            if plan.already_named.is_empty() { "" } else { "further " },
             percent(plan.probability_decided),
             percent(plan.probability_now),
             if plan.probability_source == "simulated" {
@@ -154,12 +161,14 @@ pub fn identifiability(args: &IdentifiabilityArgs) -> Result<(), Failure> {
         &resource_estimate::estimate_diagnose(&inputs.data),
         args.results.quiet,
     )?;
+    let limit = args.resources.start_time_limit(&inputs.scenario);
     let progress = stage_printer(args.results.quiet, " ...");
     let folder = args.results.output_folder(&args.scenario, "-identifiability");
     let others = args.data.iter().chain(&args.columns).chain(&args.motion);
     let read = args.results.inputs(&args.scenario, others);
     check_folder(&folder, "identifiability.json", &read)?;
     let found = stylet_api::plan_insertion::identifiability(&inputs, args.motion.as_deref(), &progress)?;
+    drop(limit);
     let output = found.output()?.with_inputs(read);
     args.results.write_and_print(&folder, &output, || identifiability_table(&found.identifiability))
 }

@@ -1,10 +1,13 @@
 //! Limits on memory and time, checked against the estimate before the work starts.
 
-use crate::cli::exit_codes::Failure;
+use crate::cli::exit_codes::{Failure, INPUT_WRONG};
 use crate::cli::terminal_output::print_error;
 use clap::Args;
 use std::fmt::Write as _;
 use std::path::Path;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
 use stylet_api::resource_estimate::ResourceEstimate;
 use stylet_report::significant;
 
@@ -22,7 +25,8 @@ pub struct ResourceLimits {
     /// Refuse work that needs more memory, as estimated beforehand: 500MB, 2GB.
     #[arg(long, value_name = "SIZE", default_value = "2GB", value_parser = parse_size)]
     pub limit_memory: f64,
-    /// Refuse work that takes longer, as estimated beforehand: 90s, 10min, 2h [default: no limit].
+    /// Refuse work that takes longer, as estimated beforehand; a diagnosis that has begun is stopped then, and writes nothing:
+    /// 90s, 10min, 2h [default: no limit].
     #[arg(long, value_name = "TIME", value_parser = parse_duration)]
     pub limit_time: Option<f64>,
 }
@@ -66,6 +70,42 @@ impl ResourceLimits {
             print_error(&text);
         }
         Ok(())
+    }
+}
+
+/// Ends the command when its work takes longer than `--limit-time`, before anything is written. Dropping it disarms it.
+pub struct TimeLimit {
+    disarm: Option<Sender<()>>,
+    watch: Option<JoinHandle<()>>,
+}
+
+impl ResourceLimits {
+    /// Starts the limit on the time of work that begins now; `at` names its input.
+    #[must_use]
+    pub fn start_time_limit(&self, at: &Path) -> TimeLimit {
+        let Some(limit_s) = self.limit_time else { return TimeLimit { disarm: None, watch: None } };
+        let (disarm, disarmed) = channel::<()>();
+        let at = at.display().to_string();
+        let watch = std::thread::spawn(move || {
+            let waited = Duration::try_from_secs_f64(limit_s).unwrap_or(Duration::MAX);
+            if disarmed.recv_timeout(waited) == Err(RecvTimeoutError::Timeout) {
+                print_error(&format!(
+                    "{at}: stopped after the limit of {}; nothing was written: cut the recordings to the insertion, or raise --limit-time\n",
+                    time(limit_s)
+                ));
+                std::process::exit(i32::from(INPUT_WRONG));
+            }
+        });
+        TimeLimit { disarm: Some(disarm), watch: Some(watch) }
+    }
+}
+
+impl Drop for TimeLimit {
+    fn drop(&mut self) {
+        drop(self.disarm.take());
+        if let Some(watch) = self.watch.take() {
+            let _ = watch.join();
+        }
     }
 }
 

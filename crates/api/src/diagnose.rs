@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::output_files::{OutputFiles, one_line, to_json_bytes};
 use stylet_diagnose::prediction::{PredictionResult, Refit};
 use stylet_diagnose::{Diagnosis, DiagnosisResult, NamedRecording, Options};
-use stylet_record::{QualityNote, assess, check_usable, downsample};
+use stylet_record::{QualityNote, Recording, assess, check_distinct, check_usable, downsample};
 use stylet_scenario::Scenario;
 
 /// Result of a diagnosis.
@@ -32,8 +32,14 @@ impl DiagnosisReport {
     /// # Errors
     /// [`Error::Internal`] when a value cannot be written.
     pub fn extended_ron(&self, assumed: &str) -> Result<String, Error> {
+        let d = &self.diagnosis;
+        let remarks: String = stylet_report::pages::diagnosis::lower_limits(d)
+            .into_iter()
+            .chain(stylet_report::pages::diagnosis::partial_model(d))
+            .chain(stylet_report::pages::diagnosis::findings(d))
+            .fold(String::new(), |text, remark| text + "// " + &remark.replace(['\n', '\r'], " ") + "\n");
         Ok(format!(
-            "// {} with re-fitted parameters and the effects found by stylet diagnose {}.\n{}",
+            "// {} with re-fitted parameters and the effects found by stylet diagnose {}.\n{remarks}{}",
             one_line(assumed),
             env!("CARGO_PKG_VERSION"),
             self.extended.to_ron().map_err(Error::internal)?
@@ -110,6 +116,8 @@ fn usable_recordings(recordings: &[NamedRecording]) -> Result<Vec<NamedRecording
         notes_by_name.push((&e.name, notes));
     }
     check_usable(notes_by_name.iter().map(|(name, notes)| (*name, notes.as_slice())))?;
+    let named: Vec<(&str, &Recording)> = recordings.iter().map(|e| (e.name.as_str(), &e.recording)).collect();
+    check_distinct(&named)?;
     Ok(recordings.iter().map(downsampled).collect())
 }
 

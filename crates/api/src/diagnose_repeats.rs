@@ -16,7 +16,7 @@ use stylet_diagnose::repeated_insertions::instrument_faults::ReferenceRecordings
 use stylet_diagnose::repeated_insertions::layer_composition::compose_layers;
 use stylet_diagnose::repeated_insertions::population_prediction::friction_model;
 use stylet_diagnose::repeated_insertions::repeatability_report::{CompositionReport, RepeatabilityReport};
-use stylet_record::{Recording, read_csv};
+use stylet_record::{Recording, check_distinct, read_csv};
 use stylet_report::pages::repeated_insertions::{ablation_figure, page};
 use stylet_scenario::Scenario;
 use stylet_score::{MeasuredRecording, MeasuredScore, Trace};
@@ -118,6 +118,8 @@ pub fn diagnose_repeats(
         ))
         .into());
     }
+    let named: Vec<(&str, &Recording)> = runs.iter().map(|r| (r.name.as_str(), &r.recording)).collect();
+    check_distinct(&named)?;
     let air = optional(set, set.air.as_deref(), given)?;
     let load = optional(set, set.load.as_ref().map(|l| l.file.as_str()), given)?;
     let known = load.as_ref().zip(set.load.as_ref()).map(|(r, l)| (r, l.force_n));

@@ -29,8 +29,10 @@ const SLIDE_S: f64 = 4e-6;
 const ARM_S: f64 = 25e-6;
 /// Time of a sweep's trial per sample (s).
 const TRIAL_SAMPLE_S: f64 = 1.5e-7;
-/// Time of a diagnosis per sample (s), on average over searches.
-const DIAGNOSE_S: f64 = 2e-4;
+/// Time of a diagnosis per sample (s) on two cores. Measured: 1e-5 without an effect, 2 to 4e-5 with one.
+const DIAGNOSE_S: f64 = 2.5e-5;
+/// The same for repeats, with nested cross-validation. Measured: 29 000 samples in 190 s.
+const REPEATS_S: f64 = 6.5e-3;
 /// Time of a prediction relative to a diagnosis.
 const PREDICT_SHARE: f64 = 0.1;
 
@@ -133,6 +135,13 @@ pub fn estimate_diagnose_samples(each: &[f64]) -> ResourceEstimate {
         duration_s: used * DIAGNOSE_S,
         remedy: "cut the recordings to the insertion",
     }
+}
+
+/// Estimate for `stylet diagnose` on repeats.
+#[must_use]
+pub fn estimate_diagnose_repeats(data: &[PathBuf]) -> ResourceEstimate {
+    let need = estimate_diagnose(data);
+    ResourceEstimate { duration_s: need.duration_s * REPEATS_S / DIAGNOSE_S, ..need }
 }
 
 /// Estimate for `stylet predict`.

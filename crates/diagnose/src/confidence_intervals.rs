@@ -17,7 +17,7 @@ use stylet_identify::model::{Model, Parameter, ParameterRole};
 use stylet_identify::rupture_likelihood::{RuptureEvent, evaluate_rupture, rupture_sds};
 use stylet_stats::linear_algebra::{CholeskyFactor, SymmetricMatrix};
 use stylet_stats::{normal, student_t};
-use stylet_tissue::{FitScale, Proposal};
+use stylet_tissue::{FitScale, ParameterInfo, Proposal};
 
 /// Cumulative probability at the upper end of a 95 % interval.
 const UPPER_PROBABILITY: f64 = 0.975;
@@ -198,6 +198,28 @@ impl<'a> Covariance<'a> {
     pub fn prior_upper_end(&self, role: ParameterRole) -> Option<f64> {
         let n = self.tangent.shared.iter().find(|n| n.role == role)?;
         is_open_above(self.fit, n).then(|| n.prior_mean + n.prior_sd * normal::quantile(UPPER_PROBABILITY))
+    }
+
+    /// Largest elastic force (N) that a layer reached in any recording, less what the scatter of its puncture force may
+    /// explain.
+    #[must_use]
+    pub fn reached_force_n(&self, layer: usize) -> f64 {
+        let events = self.fit.residuals.ruptures.iter().filter_map(|e| e.get(layer));
+        let reached_n = events.map(|e| e.elastic_n).fold(0.0, f64::max);
+        let scatter = self.fit.model.scatter.rupture_force;
+        reached_n * (1.0 - normal::quantile(UPPER_PROBABILITY) * scatter).max(0.0)
+    }
+
+    /// Paths of the parameters of an effect that stand at a bound of the search.
+    #[must_use]
+    pub fn effect_bounds(&self, effect: usize) -> Vec<String> {
+        let choice = &self.fit.model.effects[effect];
+        let parameters = choice.info.parameters.iter().zip(&choice.values).enumerate();
+        // An infinite value is the rigid limit, not a bound.
+        let at_bound = |(parameter, (_, value)): &(usize, (&ParameterInfo, &f64))| {
+            value.is_finite() && self.at_bound(ParameterRole::Effect { effect, parameter: *parameter })
+        };
+        parameters.filter(at_bound).map(|(_, (p, _))| p.path.to_owned()).collect()
     }
 
     /// Whether a shared parameter stands at a bound.

@@ -3,11 +3,16 @@
 
 use crate::base_law_fit::{PreparedRecordings, fit_base_law, refit_with_random_effects};
 use crate::baseline_search::search_with_baseline;
+use crate::claims::{self, Context, have_one_motion};
 use crate::competing_effects::{CompetingEffect, find_competing_effects};
 use crate::diagnosis_json::*;
 use crate::error::DiagnoseError;
+use crate::fast_tone_cause::{fast_tone_cause, mark_mains, tone_mean_square_n2, without_removed_tones};
+use crate::fast_tones::remove_fast_tones;
+use crate::general_forms::mark_general_forms;
 use crate::held_out::{
-    FreeRunResidual, JackknifeResult, held_out_residuals, jackknife_effects, pooled_rms, sample_noise_sd_n,
+    FreeRunResidual, JackknifeResult, held_out_residuals, jackknife_effects, pooled_rms,
+    pooled_rms_given_scatter, sample_noise_sd_n,
 };
 use crate::identifiability::{advice, not_identifiable};
 use crate::input_checks::{
@@ -15,6 +20,7 @@ use crate::input_checks::{
 };
 use crate::motion_period::common_motion_period_s;
 use crate::negligible_effects::{Negligible, negligible_effects};
+use crate::partial_model::partial_model;
 use crate::random_effect_selection::select_random_effects;
 use crate::selection_state::{Search, SearchStage};
 use crate::sensor_artefact_causes::sensor_artefact_causes;
@@ -23,6 +29,7 @@ use crate::zero_steps::{ZeroStepReport, zero_effects};
 use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::likelihood::FitData;
 use stylet_identify::model::Assumptions;
 use stylet_scenario::Scenario;
 use stylet_tissue::{AnyEffect, Effect};
@@ -64,15 +71,18 @@ pub fn diagnose(
     mut progress: impl FnMut(&str),
 ) -> Result<DiagnosisResult, DiagnoseError> {
     let force_ratios = check_recordings(scenario, recordings)?;
-    let CleanRecordings { recordings: clean, mut notes, raw } = clean_recordings(recordings);
+    let CleanRecordings { recordings: mut clean, mut notes, raw } = clean_recordings(recordings);
     for (notes, outlier) in notes.iter_mut().zip(force_outlier_notes(&force_ratios)) {
         notes.extend(outlier);
     }
+    let tones = remove_fast_tones(&mut clean, &raw.exclude, BLOCK_S);
+    let assumptions = without_removed_tones(assumptions_of(scenario), &tones);
+    let one_motion = have_one_motion(&clean);
     progress("fitting the base law");
     let blocks: Vec<BlockAverages> =
         clean.par_iter().zip(&raw.exclude).map(|(r, x)| BlockAverages::new(r, x, BLOCK_S)).collect();
     let prepared = PreparedRecordings::new(
-        Arc::new(assumptions_of(scenario)),
+        Arc::new(assumptions),
         blocks,
         raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD,
     );
@@ -132,6 +142,8 @@ pub fn diagnose(
         negligible = move_negligible(&mut assessment, small);
     }
     let mut artefacts = sensor_artefact_causes(&raw, noise_n);
+    artefacts.extend(fast_tone_cause(&tones, &scenario.effects, &clean));
+    let named_tones_n = artefacts.iter().map(tone_mean_square_n2).sum::<f64>().sqrt();
     if assessment.unknown {
         let results = jackknife_effects(&search.best, &search.data, noise_n);
         let effects = search.best.model.effects.iter().zip(&results);
@@ -151,9 +163,20 @@ pub fn diagnose(
     for (notes, zero) in notes.iter_mut().zip(zeros.notes) {
         notes.extend(zero);
     }
-    // Without an identified effect the base law is the final model.
+    if !options.brief {
+        mark_general_forms(&mut causes, &search);
+    }
+    mark_mains(&mut causes, &search);
+    let has_cause = has_cause(&search, &causes);
+    // Without an identified effect the base law is the final model, unless the best model predicts better in the presence of
+    // an unmodelled force.
+    let partial = if assessment.unknown {
+        partial_model(&search, &base_held_out, &extended_held_out, noise_n)
+    } else {
+        None
+    };
     let extended_held_out =
-        if has_cause(&search, &causes) { extended_held_out } else { base_held_out.clone() };
+        if has_cause || partial.is_some() { extended_held_out } else { base_held_out.clone() };
     let verdict = if assessment.unknown {
         Verdict::Unknown
     } else if causes.iter().any(|c| !c.equivalent.is_empty()) {
@@ -166,21 +189,29 @@ pub fn diagnose(
     causes.append(&mut artefacts);
     let not_identifiable =
         if options.brief { Vec::new() } else { not_identifiable(&search.best, &search.data) };
+    let with_tones = |error_n: f64| error_n.hypot(named_tones_n);
     let gain = Gain {
         held_out: recordings.len() > 1,
         recordings: recordings.iter().map(|r| r.name.clone()).collect(),
-        rmse_before_n: pooled_rms(&base_held_out, &search.data),
+        rmse_before_n: with_tones(pooled_rms(&base_held_out, &search.data)),
         rmse_after_n: pooled_rms(&extended_held_out, &search.data),
+        rmse_given_scatter_n: pooled_rms_given_scatter(&extended_held_out, &search.data),
         floor_n: noise_n,
-        per_recording_n: errors_per_recording(&base_held_out, &extended_held_out, &search),
+        per_recording_n: errors_per_recording(&base_held_out, &extended_held_out, &search)
+            .into_iter()
+            .map(|(before, after)| (with_tones(before), after))
+            .collect(),
     };
     let mut data_quality = Vec::new();
     for (r, notes) in recordings.iter().zip(notes) {
         data_quality
             .extend(notes.into_iter().map(|note| DataQualityNote { recording: r.name.clone(), note }));
     }
-    let diagnosis = Diagnosis {
+    let mut diagnosis = Diagnosis {
         verdict,
+        agrees: false,
+        findings: Vec::new(),
+        partial,
         advice: advice(&causes, &not_identifiable, common_motion_period_s(&search.data)),
         base_parameters: assessment.base_parameters,
         not_identifiable,
@@ -193,6 +224,13 @@ pub fn diagnose(
         random_effect_sd: random_effect_sd(&search),
         causes,
     };
+    let context = Context {
+        one_motion,
+        sensor_noise_n: scenario.sensor.force_torque().map(|s| s.noise_n),
+        air_noise_n: air_noise_n(scenario, &search.data),
+        resolution_n: raw.step_n.unwrap_or(0.0),
+    };
+    claims::apply(&mut diagnosis, &context);
     let extended_scenario = extended_scenario(scenario, &search, &diagnosis);
     Ok(DiagnosisResult {
         diagnosis,
@@ -241,6 +279,28 @@ fn random_effect_sd(search: &Search) -> RandomEffectSd {
     }
 }
 
+/// Standard deviation (N) of the samples within blocks that lie in air in front of the assumed surface; `None` without such
+/// blocks.
+fn air_noise_n(scenario: &Scenario, data: &FitData) -> Option<f64> {
+    /// Blocks in air that are enough for a standard deviation to 10 %.
+    const MIN_AIR_BLOCKS: usize = 50;
+    let end_m = scenario.tissue.surface_m - 2.0 * scenario.surface_tolerance_m;
+    let mut squares = Vec::new();
+    for b in data.recordings.iter() {
+        let e = b.sample_residuals(&vec![0.0; b.len()]);
+        let mut sums = vec![(0.0, 0.0); b.len()];
+        for (e, k) in e.iter().zip(b.sample_block.iter()) {
+            let sum: &mut (f64, f64) = &mut sums[*k as usize];
+            *sum = (sum.0 + e * e, sum.1 + 1.0);
+        }
+        let in_air = |k: usize| b.motion.at(0.5 * (b.start_s[k] + b.end_s[k])).0 < end_m;
+        squares.extend(
+            (0..b.len()).filter(|k| b.used[*k] && in_air(*k)).map(|k| sums[k].0 / f64::max(sums[k].1, 1.0)),
+        );
+    }
+    (squares.len() >= MIN_AIR_BLOCKS).then(|| stylet_stats::mean(&squares).sqrt())
+}
+
 /// First two autoregressive coefficients per block, at the smallest forces.
 fn autoregression(search: &Search) -> [f64; 2] {
     search.data.noise.bins.first().map_or([0.0; 2], |b| [b.ar[0], b.ar[1]])
@@ -270,14 +330,16 @@ fn has_cause(search: &Search, causes: &[Cause]) -> bool {
         || search.best.model.effects.iter().any(|e| causes.iter().any(|c| c.effect == e.info.id))
 }
 
-/// The scenario with the identified effects.
+/// The scenario with the identified effects; in the presence of an unmodelled force with those of the partial model.
 fn extended_scenario(scenario: &Scenario, search: &Search, d: &Diagnosis) -> Scenario {
     let mut out = scenario.clone();
     let none = search.best.model.effects.is_empty() && d.verdict != Verdict::Unknown;
-    let source = if none || has_cause(search, &d.causes) { &search.best } else { &search.base };
+    let best = none || d.partial.is_some() || has_cause(search, &d.causes);
+    let source = if best { &search.best } else { &search.base };
     out.tissue = source.model.tissue.clone();
     out.effects.extend(zero_effects(search, &d.causes));
-    let named = |id: &str| d.causes.iter().any(|c| c.effect == id);
+    let in_partial = |id: &str| d.partial.as_ref().is_some_and(|p| p.effects.iter().any(|e| e == id));
+    let named = |id: &str| in_partial(id) || d.causes.iter().any(|c| c.effect == id);
     out.effects.extend(source.model.effects.iter().filter(|e| named(e.info.id)).filter_map(|e| e.effect()));
     let given: Vec<&str> = out.effects.iter().map(Effect::id).collect();
     let missing: Vec<&Cause> = d.causes.iter().filter(|c| !given.contains(&c.effect.as_str())).collect();

@@ -30,7 +30,7 @@ pub struct Estimate {
 }
 
 /// An identified effect.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cause {
     /// Identifier of the effect.
     pub effect: String,
@@ -45,6 +45,16 @@ pub struct Cause {
     /// Share of the base law's residual variance beyond the noise that returns without this effect, 0 to 1.
     #[serde(default)]
     pub share: f64,
+    /// Paths of parameters that stand at a bound of the search: the data do not determine them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub at_bound: Vec<String>,
+    /// Effects that hold this one as a special case and that these recordings cannot separate from it: the simpler one is
+    /// kept, and they share its confidence.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub general_forms: Vec<String>,
+    /// What else is known, such as `50 Hz mains, aliased to 30 Hz`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub remark: Option<String>,
 }
 
 /// An effect that was found but is negligible, or that does not improve the prediction of held-out recordings.
@@ -77,6 +87,9 @@ pub struct BaseParameter {
     pub changed: bool,
     /// Whether the estimate lies at a bound of the tolerance.
     pub at_bound: bool,
+    /// Whether the value is only a lower limit: a puncture force that no recording reached, which is at least `low`.
+    #[serde(default)]
+    pub at_least: bool,
 }
 
 /// Improvement of the prediction.
@@ -90,6 +103,10 @@ pub struct Gain {
     pub rmse_before_n: f64,
     /// RMS error of the extended model in N.
     pub rmse_after_n: f64,
+    /// The same with ruptures, surface and friction of each recording as observed: what scatter between recordings does not
+    /// explain.
+    #[serde(default)]
+    pub rmse_given_scatter_n: f64,
     /// Standard deviation of the noise in N.
     pub floor_n: f64,
     /// Errors of base law and extended model per recording, in N.
@@ -170,11 +187,60 @@ pub struct DataQualityNote {
     pub note: QualityNote,
 }
 
+/// The best model beside an unmodelled force.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PartialModel {
+    /// Effects of the model, causes included; some may imitate the unmodelled force.
+    pub effects: Vec<String>,
+    /// Share of the base law's mean square held-out error beyond the noise that the model removes, 0 to 1.
+    pub share: f64,
+}
+
+/// Kind of a [`Finding`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FindingKind {
+    /// The model predicts the recordings worse than noise and scatter between them explain.
+    PredictionError,
+    /// The residual depends on a feature.
+    ResidualStructure,
+    /// A parameter stands at its bound.
+    AtBound,
+    /// Recordings differ too much for one model.
+    Scatter,
+    /// The noise is far above that of the scenario's sensor, or above that in air.
+    NoiseLevel,
+    /// A recording is not like the others.
+    OutlierRecording,
+    /// One recording: none could be held out.
+    OneRecording,
+    /// All recordings have the same motion.
+    OneMotion,
+}
+
+/// A reason against agreement with the data, or for less confidence.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Finding {
+    /// Kind.
+    pub kind: FindingKind,
+    /// The finding in words, with its numbers.
+    pub message: String,
+}
+
 /// Result of a diagnosis.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// Verdict.
     pub verdict: Verdict,
+    /// Whether the simulation agrees with the data: no effect is missing, and no finding contradicts.
+    #[serde(default)]
+    pub agrees: bool,
+    /// Findings that contradict agreement, or that limit the confidence.
+    #[serde(default)]
+    pub findings: Vec<Finding>,
+    /// The best model beside an unmodelled force, kept in `extended.ron`; only with the verdict `unknown`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub partial: Option<PartialModel>,
     /// Identified effects, largest gain first.
     pub causes: Vec<Cause>,
     /// Parameters of the base law as fitted.

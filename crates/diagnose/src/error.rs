@@ -74,6 +74,23 @@ pub enum DiagnoseError {
         /// Scale that would correct it.
         scale: f64,
     },
+    /// Time in another unit.
+    #[error(
+        "{name}: it lasts {duration_s:.4} s, and {expected}: the time looks like {unit}; give a \
+         column map with time: (name: \"time_s\", scale: {scale})"
+    )]
+    TimeUnit {
+        /// Recording.
+        name: String,
+        /// Its duration as read.
+        duration_s: f64,
+        /// What the scenario expects.
+        expected: String,
+        /// Probable unit.
+        unit: &'static str,
+        /// Scale that would correct it.
+        scale: &'static str,
+    },
     /// Force with another unit or sign.
     #[error("{name}: {what}; give a column map with force: (name: \"force_n\", scale: {scale})")]
     Force {

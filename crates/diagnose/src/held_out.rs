@@ -15,6 +15,9 @@ const RUPTURE_SHIFT_SAMPLES: f64 = 2.0;
 pub struct FreeRunResidual {
     /// Mean square in N² over the compared blocks.
     pub mean_square_n2: f64,
+    /// The same with ruptures, surface and friction of the recording as observed: what remains when the scatter between
+    /// recordings is known.
+    pub given_scatter_n2: f64,
     /// Number of compared blocks.
     pub compared_blocks: usize,
     /// Residual of every block in N.
@@ -49,11 +52,12 @@ pub fn predict_free_run(model: &Model, data: &FitData, r: usize) -> Option<FreeR
     let mut at = model.clone();
     at.rupture_times_s[r].clone_from(&rupture_times_s);
     let predicted = replay(&at, data, r)?;
-    let residual_n: Vec<f64> = b.force_n.iter().zip(&predicted.force_n).map(|(y, f)| y - f).collect();
-    let kept = residual_n.iter().zip(&b.used).filter(|(_, u)| **u);
-    let (square, compared_blocks) = kept.fold((0.0, 0), |(s, n), (e, _)| (s + e * e, n + 1));
+    let residual_n = residual(data, r, &predicted.force_n);
+    let mean_square_n2 = mean_square(&residual_n, data, r);
+    let compared_blocks = b.used.iter().filter(|u| **u).count();
     Some(FreeRunResidual {
-        mean_square_n2: square / compared_blocks.max(1) as f64,
+        mean_square_n2,
+        given_scatter_n2: mean_square_n2,
         compared_blocks,
         residual_n,
         rupture_times_s,
@@ -86,9 +90,28 @@ fn held_out_residuals_with(
             if n > 1 {
                 model.per_recording[r] = random_effects(r);
             }
-            predict_free_run(&model, data, r)
+            let mut result = predict_free_run(&model, data, r)?;
+            model.per_recording[r] = best.model.per_recording[r];
+            model.rupture_times_s[r].clone_from(&best.model.rupture_times_s[r]);
+            let given_n2 =
+                replay(&model, data, r).map(|f| mean_square(&residual(data, r, &f.force_n), data, r));
+            result.given_scatter_n2 =
+                given_n2.map_or(result.mean_square_n2, |g| g.min(result.mean_square_n2));
+            Some(result)
         })
         .collect()
+}
+
+/// Measured minus predicted force of a recording in N.
+fn residual(data: &FitData, r: usize, predicted_n: &[f64]) -> Vec<f64> {
+    data.recordings[r].force_n.iter().zip(predicted_n).map(|(y, f)| y - f).collect()
+}
+
+/// Mean square over the compared blocks of a recording, in N².
+fn mean_square(residual_n: &[f64], data: &FitData, r: usize) -> f64 {
+    let kept = residual_n.iter().zip(&data.recordings[r].used).filter(|(_, used)| **used);
+    let (square, count) = kept.fold((0.0, 0.0), |(s, n), (e, _)| (s + e * e, n + 1.0));
+    square / f64::max(count, 1.0)
 }
 
 /// Leave-one-recording-out results of one effect.
@@ -172,10 +195,24 @@ fn refit_without(best: &Fit, data: &FitData, r: usize) -> Option<Model> {
 /// RMS in N over recordings, including the noise of samples within their blocks.
 #[must_use]
 pub fn pooled_rms(residuals: &[Option<FreeRunResidual>], data: &FitData) -> f64 {
+    pooled_rms_of(residuals, data, |l| l.mean_square_n2)
+}
+
+/// The same with the scatter between recordings known.
+#[must_use]
+pub fn pooled_rms_given_scatter(residuals: &[Option<FreeRunResidual>], data: &FitData) -> f64 {
+    pooled_rms_of(residuals, data, |l| l.given_scatter_n2)
+}
+
+fn pooled_rms_of(
+    residuals: &[Option<FreeRunResidual>],
+    data: &FitData,
+    square_n2: impl Fn(&FreeRunResidual) -> f64,
+) -> f64 {
     let (mut sum, mut n) = (0.0, 0.0);
     for (l, b) in residuals.iter().zip(data.recordings.iter()) {
         if let Some(l) = l {
-            sum += l.compared_blocks as f64 * (l.mean_square_n2 + b.within_block_sd_n().powi(2));
+            sum += l.compared_blocks as f64 * (square_n2(l) + b.within_block_sd_n().powi(2));
             n += l.compared_blocks as f64;
         }
     }

@@ -109,6 +109,7 @@ mod tests {
             parameters: BTreeMap::new(),
             gain_nats: 0.0,
             share: 0.0,
+            ..Cause::default()
         };
         assert!(
             advice(

@@ -86,9 +86,84 @@ pub(crate) fn check_recordings(
             };
             return Err(DiagnoseError::NeverReaches { name: name(), deepest_m, surface_m, remedy });
         }
+        check_time_unit(scenario, e, &usable)?;
         ratios.push(force_ratio_of(scenario, e, &usable)?);
     }
     Ok(ratios)
+}
+
+/// Units of time with their length in s, as a column map gives them.
+const TIME_UNITS: [(&str, &str, f64); 5] = [
+    ("microseconds", "1e-6", 1e-6),
+    ("milliseconds", "1e-3", 1e-3),
+    ("minutes", "60", 60.0),
+    ("hours", "3600", 3600.0),
+    ("centiseconds", "0.01", 0.01),
+];
+/// Duration and speed of the scenario's motion and of a recording agree within this factor.
+const SAME_MOTION_FACTOR: f64 = 1.25;
+
+/// Refuses a time in another unit than seconds: duration and speed are those of the scenario's motion in that unit, and
+/// neither is in seconds.
+fn check_time_unit(scenario: &Scenario, e: &NamedRecording, usable: &[usize]) -> Result<(), DiagnoseError> {
+    let r = &e.recording;
+    let (Some(&first), Some(&last)) = (usable.first(), usable.last()) else { return Ok(()) };
+    let duration_s = r.time_s[last] - r.time_s[first];
+    let wrong = |expected: String, unit: &'static str, scale: &'static str| DiagnoseError::TimeUnit {
+        name: e.name.clone(),
+        duration_s,
+        expected,
+        unit,
+        scale,
+    };
+    let Some(plan) = scenario.motion.plan() else {
+        return force_in_other_unit(scenario, r, usable).map_or(Ok(()), |(unit, scale)| {
+            Err(wrong("its force is that of slower motions".to_owned(), unit, scale))
+        });
+    };
+    let path_m: f64 = usable.windows(2).map(|w| (r.position_m[w[1]] - r.position_m[w[0]]).abs()).sum();
+    /// Times at which the planned motion is sampled.
+    const POINTS: usize = 2000;
+    let (mut planned_path_m, mut before) = (0.0, None);
+    for k in 0..=POINTS {
+        let z = plan.at(plan.duration_s() * k as f64 / POINTS as f64).position_m;
+        planned_path_m += before.replace(z).map_or(0.0, |b: f64| (z - b).abs());
+    }
+    // Speed averaged over the motion.
+    let (speed_mps, planned_mps) = (path_m / duration_s, planned_path_m / plan.duration_s());
+    let near = |ratio: f64| ratio < SAME_MOTION_FACTOR && ratio * SAME_MOTION_FACTOR > 1.0;
+    let is_unit =
+        |unit_s: f64| near(unit_s * duration_s / plan.duration_s()) && near(speed_mps / unit_s / planned_mps);
+    match TIME_UNITS.into_iter().find(|(_, _, unit_s)| is_unit(*unit_s)) {
+        Some((unit, scale, _)) if !is_unit(1.0) => {
+            Err(wrong(format!("the scenario's motion takes {:.4} s", plan.duration_s()), unit, scale))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A unit of time longer than the second in which the expected force has the measured size, when it is far larger in
+/// seconds and the needle is faster than a robot inserts it.
+fn force_in_other_unit(
+    scenario: &Scenario,
+    r: &Recording,
+    usable: &[usize],
+) -> Option<(&'static str, &'static str)> {
+    /// Speed in m/s above which insertions are rare.
+    const FAST_MPS: f64 = 0.05;
+    /// Ratio of measured to expected force in seconds, at most.
+    const MAX_RATIO: f64 = 1.0 / 3.0;
+    let speeds = usable.iter().map(|&i| r.velocity_mps[i].abs());
+    if stylet_stats::order_statistics::median_of(speeds) < FAST_MPS {
+        return None;
+    }
+    let (ratio, _) = force_ratio_in_unit(scenario, r, usable, 1.0)?;
+    let fits = |unit_s: f64| {
+        force_ratio_in_unit(scenario, r, usable, unit_s)
+            .is_some_and(|(ratio, correlation)| (0.5..2.0).contains(&ratio) && correlation > 0.8)
+    };
+    let unit = TIME_UNITS.into_iter().find(|(_, _, unit_s)| *unit_s > 1.0 && fits(*unit_s))?;
+    (ratio < MAX_RATIO).then_some((unit.0, unit.1))
 }
 
 /// A note for each recording whose force ratio (see [`check_recordings`]) differs from that of the others.
@@ -126,27 +201,9 @@ fn force_ratio_of(
     e: &NamedRecording,
     usable: &[usize],
 ) -> Result<Option<f64>, DiagnoseError> {
-    let r = &e.recording;
-    let Ok(law) = ForceLaw::new(&scenario.tissue, &scenario.effects) else { return Ok(None) };
-    let mut expected_n = Vec::with_capacity(usable.len());
-    replay(
-        &law,
-        usable.iter().map(|&i| (r.time_s[i], r.position_m[i], r.velocity_mps[i])),
-        |_| {},
-        |f| expected_n.push(f.total_n),
-    );
-    let mean: f64 = usable.iter().map(|&i| r.force_n[i]).sum::<f64>() / usable.len() as f64;
-    let expected: f64 = expected_n.iter().sum::<f64>() / expected_n.len() as f64;
-    let (mut ff, mut bb, mut fb) = (0.0, 0.0, 0.0);
-    for (&i, b) in usable.iter().zip(&expected_n) {
-        let (f, b) = (r.force_n[i] - mean, b - expected);
-        ff += f * f;
-        bb += b * b;
-        fb += f * b;
-    }
-    let (measured, model) = (ff.sqrt(), bb.sqrt());
-    let correlation = fb / (measured * model).max(1e-300);
-    let ratio = measured / model.max(1e-300);
+    let Some((ratio, correlation)) = force_ratio_in_unit(scenario, &e.recording, usable, 1.0) else {
+        return Ok(None);
+    };
     let wrong = |what: String, scale: f64| Err(DiagnoseError::Force { name: e.name.clone(), what, scale });
     if correlation < -0.5 {
         return wrong(
@@ -167,6 +224,34 @@ fn force_ratio_of(
         );
     }
     Ok((correlation > 0.5).then_some(ratio))
+}
+
+/// Size of the measured force over that of the assumed model, and their correlation, when the time is in units of `unit_s`.
+fn force_ratio_in_unit(
+    scenario: &Scenario,
+    r: &Recording,
+    usable: &[usize],
+    unit_s: f64,
+) -> Option<(f64, f64)> {
+    let law = ForceLaw::new(&scenario.tissue, &scenario.effects).ok()?;
+    let mut expected_n = Vec::with_capacity(usable.len());
+    replay(
+        &law,
+        usable.iter().map(|&i| (r.time_s[i] * unit_s, r.position_m[i], r.velocity_mps[i] / unit_s)),
+        |_| {},
+        |f| expected_n.push(f.total_n),
+    );
+    let mean: f64 = usable.iter().map(|&i| r.force_n[i]).sum::<f64>() / usable.len() as f64;
+    let expected: f64 = expected_n.iter().sum::<f64>() / expected_n.len() as f64;
+    let (mut ff, mut bb, mut fb) = (0.0, 0.0, 0.0);
+    for (&i, b) in usable.iter().zip(&expected_n) {
+        let (f, b) = (r.force_n[i] - mean, b - expected);
+        ff += f * f;
+        bb += b * b;
+        fb += f * b;
+    }
+    let (measured, model) = (ff.sqrt(), bb.sqrt());
+    Some((measured / model.max(1e-300), fb / (measured * model).max(1e-300)))
 }
 
 /// Whether all columns of a sample are finite.

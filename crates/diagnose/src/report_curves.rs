@@ -36,7 +36,7 @@ pub struct RecordingCurves {
 #[must_use]
 pub fn reported_fit(examined: &DiagnosisResult) -> &Fit {
     let d = &examined.diagnosis;
-    if d.verdict == Verdict::Unknown && d.causes.is_empty() {
+    if d.verdict == Verdict::Unknown && d.causes.is_empty() && d.partial.is_none() {
         &examined.search.base
     } else {
         &examined.search.best

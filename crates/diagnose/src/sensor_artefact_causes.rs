@@ -26,6 +26,7 @@ pub(crate) fn sensor_artefact_causes(raw: &SensorArtefacts, noise_n: f64) -> Vec
             parameters,
             gain_nats: 0.0,
             share: 0.0,
+            ..Cause::default()
         });
     };
     let about = |value: f64, sd: f64| (value - Z95 * sd, value + Z95 * sd);

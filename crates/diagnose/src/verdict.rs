@@ -172,6 +172,8 @@ pub(crate) fn assess_search(search: &mut Search, competing: &[Vec<CompetingEffec
             parameters,
             gain_nats,
             share: (returned / before.max(1e-9)).clamp(0.0, 1.0),
+            at_bound: covariance.effect_bounds(k),
+            ..Cause::default()
         });
     }
     let base_parameters = base_parameters(search, &covariance);
@@ -267,8 +269,14 @@ fn base_parameters(search: &Search, covariance: &Covariance) -> Vec<BaseParamete
     let assumed_tissue = &search.best.model.assumed.tissue;
     let mut add = |layer: usize, name: &str, role: ParameterRole, assumed: f64, scale: f64| {
         let Some((x, half)) = covariance.shared_parameter(role) else { return };
-        let (value, low) = (x * scale, (x - half) * scale);
-        let high = covariance.prior_upper_end(role).map_or(x + half, |open| open.max(x + half)) * scale;
+        let open_above = covariance.prior_upper_end(role);
+        let reached_n = match role {
+            ParameterRole::Puncture(l) if open_above.is_some() => covariance.reached_force_n(l),
+            _ => f64::NEG_INFINITY,
+        };
+        let value = (x * scale).max(reached_n);
+        let low = ((x - half) * scale).max(reached_n);
+        let high = (open_above.map_or(x + half, |open| open.max(x + half)) * scale).max(value);
         out.push(BaseParameter {
             layer,
             name: name.to_owned(),
@@ -278,6 +286,7 @@ fn base_parameters(search: &Search, covariance: &Covariance) -> Vec<BaseParamete
             high,
             changed: assumed < low || assumed > high,
             at_bound: covariance.at_bound(role),
+            at_least: open_above.is_some(),
         });
     };
     for (l, layer) in assumed_tissue.layers.iter().enumerate() {

@@ -86,6 +86,8 @@ pub struct Plan {
     pub probability_source: String,
     /// Simulated insertions not used to select the motion.
     pub simulated: Vec<CandidateTrials>,
+    /// Effects that the diagnosis has already named; every candidate includes them.
+    pub already_named: Vec<String>,
     /// Candidates with their prior probabilities.
     pub candidates: Vec<(String, f64)>,
     /// The motion.
@@ -227,6 +229,7 @@ pub(crate) fn plan_with_motion(
         probability_now: p_decided(state, &known, &found.distinguishable),
         probability_source: "gaps".to_owned(),
         simulated: Vec::new(),
+        already_named: state.base.effects.iter().map(|e| e.info.id.to_owned()).collect(),
         candidates: state.candidates.iter().map(|c| (c.name.clone(), c.probability)).collect(),
         motion: best.motion.clone(),
         duration_s: profile.as_ref().map_or(0.0, |p| p.duration_s()),

@@ -229,6 +229,13 @@ pub enum RecordError {
     #[error("{}{}", unusable(*of, wrong.len()), wrong.join("\n"))]
     Unusable { of: usize, wrong: Vec<String> },
 
+    /// The same recording under several names.
+    #[error(
+        "the same recording was given more than once, and would be fitted and held out at once: {}; name each recording once",
+        copies.join(", ")
+    )]
+    Copies { copies: Vec<String> },
+
     /// An extra column has an invalid name.
     #[error("the extra column \"{name}\" cannot be written: {why}; choose another name")]
     BadColumnName { name: String, why: &'static str },

@@ -65,7 +65,8 @@ pub use error::RecordError;
 pub use ground_truth::{LayerTruth, TrueRupture, Truth};
 pub use long_recording::{LongRecording, read_long_csv};
 pub use quality::{
-    MIN_SAMPLES, QualityKind, QualityNote, assess, check_usable, find_outlier_recordings, sensor_artefacts,
+    MIN_SAMPLES, QualityKind, QualityNote, assess, check_distinct, check_usable, find_outlier_recordings,
+    sensor_artefacts,
 };
 pub use recording::{JOINTS, Recording, Sample};
 

@@ -6,6 +6,8 @@
 //! module of the check.
 
 mod constant_runs;
+mod copies;
+mod direction;
 mod extent;
 mod note;
 mod outlier_recordings;
@@ -17,6 +19,7 @@ mod spikes;
 mod timestamps;
 mod unit_mismatch;
 
+pub use copies::check_distinct;
 pub(crate) use note::repaired_rows;
 pub use note::{QualityKind, QualityNote};
 pub use outlier_recordings::find_outlier_recordings;
@@ -59,6 +62,9 @@ pub(crate) fn assess_stream<A: SampleStream>(recording: &A) -> Result<Vec<Qualit
     if dead.is_none() && notes.is_empty() {
         notes.extend(plausibility::reversed_force(recording)?);
         notes.extend(plausibility::only_in_air(recording, &extent)?);
+        if notes.is_empty() && plausibility::no_motion(&extent).is_none() {
+            notes.extend(direction::without_insertion(recording, &extent)?);
+        }
     }
     notes.extend(dead);
     notes.extend(plausibility::no_motion(&extent));

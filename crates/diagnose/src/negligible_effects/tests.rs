@@ -18,6 +18,7 @@ fn cause(effect: &str, gain_nats: f64) -> Cause {
         parameters: BTreeMap::new(),
         gain_nats,
         share: 0.0,
+        ..Cause::default()
     }
 }
 

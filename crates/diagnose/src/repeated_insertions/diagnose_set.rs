@@ -13,6 +13,7 @@ use super::parameter_estimates::{ParameterEstimate, base_parameters, jackknife_e
 use super::repeatability_report::{AblationRow, RepeatabilityReport, ReportInputs, repeatability_report};
 use super::scored_model::{ModelFamily, ScoredModel, active_effects, shaft_slip_info};
 use super::segmented_recording::{SegmentedRecording, have_several_speeds};
+use crate::claims::{self, Context};
 use crate::diagnosis_json::{
     Cause, Diagnosis, Estimate, Gain, NegligibleEffect, NoiseReport, RandomEffectSd, ResidualStructureReport,
     SearchCandidate, SearchStep, Verdict,
@@ -32,8 +33,6 @@ const START_VALUE_SEED: u64 = 1;
 const MAX_UNEXPLAINED_SHARE: f64 = 0.1;
 /// ... and the held-out error exceeds the floor by this share.
 const MAX_EXCESS_OVER_FLOOR: f64 = 0.2;
-/// Largest confidence in an effect with a parameter at its bound.
-const MAX_CONFIDENCE_AT_BOUND: f64 = 0.9;
 
 /// Result of the diagnosis of repeated recordings.
 pub struct SetDiagnosis {
@@ -205,8 +204,11 @@ fn diagnosis(
         (false, false) => Verdict::Named,
     };
     let scatter = &model.scatter;
-    Diagnosis {
+    let mut diagnosis = Diagnosis {
         verdict,
+        agrees: false,
+        findings: Vec::new(),
+        partial: None,
         causes,
         base_parameters: base_parameters(&estimates, assumed),
         not_identifiable: unidentified_effects(best, recordings),
@@ -215,6 +217,7 @@ fn diagnosis(
             recordings: recordings.iter().map(|r| r.name.clone()).collect(),
             rmse_before_n: mean.base_n,
             rmse_after_n: mean.with_discrepancy_n,
+            rmse_given_scatter_n: if mean.floor_n.is_some() { mean.with_discrepancy_n } else { 0.0 },
             floor_n,
             per_recording_n: repeats.recordings.iter().map(|r| (r.base_n, r.with_discrepancy_n)).collect(),
         },
@@ -239,7 +242,10 @@ fn diagnosis(
             friction: scatter.ln_friction,
         },
         advice: advice(best, &estimates),
-    }
+    };
+    // The floor is what recordings predict of each other, so scatter between them is in it.
+    claims::apply(&mut diagnosis, &Context::default());
+    diagnosis
 }
 
 /// Effects that recordings at one speed cannot identify. A delayed puncture counts only where no puncture
@@ -265,17 +271,20 @@ fn cause(
 ) -> Cause {
     let parameters: BTreeMap<String, Estimate> =
         estimates.iter().filter(|t| t.owner == id).map(|t| (t.path.clone(), t.estimate())).collect();
-    let bound = estimates.iter().any(|t| t.owner == id && t.at_bound);
+    let at_bound: Vec<String> =
+        estimates.iter().filter(|t| t.owner == id && t.at_bound).map(|t| t.path.clone()).collect();
     let square = |e: &[f64]| stylet_stats::mean(&e.iter().map(|e| e * e).collect::<Vec<_>>());
     let explained = (square(&base.errors_n) - square(&best.errors_n)).max(1e-12);
     let share = (square(without) - square(&best.errors_n)) / explained;
     Cause {
         effect: id.to_owned(),
         equivalent: Vec::new(),
-        confidence: if bound { confidence.min(MAX_CONFIDENCE_AT_BOUND) } else { confidence },
+        confidence,
         parameters,
         gain_nats: (base.set_fit.fit.nats() - best.set_fit.fit.nats()).max(0.0),
         share: if share.is_finite() { share.clamp(0.0, 1.0) } else { 1.0 },
+        at_bound,
+        ..Cause::default()
     }
 }
 

@@ -139,6 +139,7 @@ pub fn base_parameters(estimates: &[ParameterEstimate], assumed_tissue: &Tissue)
                 high: t.high,
                 changed: !(t.low <= assumed && assumed <= t.high),
                 at_bound: t.at_bound,
+                at_least: false,
             })
         })
         .collect()

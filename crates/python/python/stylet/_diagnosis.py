@@ -28,26 +28,36 @@ class Diagnosis:
         return self.result["verdict"]
 
     @property
+    def agrees(self) -> bool:
+        """Whether the simulation agrees with the data: no effect is missing, and no finding contradicts."""
+        return self.result["agrees"]
+
+    @property
+    def findings(self) -> list[str]:
+        """What contradicts agreement or limits the confidences, one sentence each."""
+        return [finding["message"] for finding in self.result["findings"]]
+
+    @property
     def gain(self) -> dict:
         """RMS before and after, and noise floor, in N."""
         return self.result["gain"]
 
     @property
     def causes(self):
-        """A table: effect, parameter, value, low, high, confidence."""
+        """A table: effect, parameter, value, low, high, whether it stands at a bound, confidence."""
         return _data.frame(self._rows())
 
     def _rows(self) -> list[dict]:
         return [
             {"effect": cause["effect"], "parameter": name, **{k: p[k] for k in ("value", "low", "high")}}
-            | {"confidence": cause["confidence"]}
+            | {"at_bound": name in cause.get("at_bound", []), "confidence": cause["confidence"]}
             for cause in self.result["causes"]
             for name, p in (cause["parameters"] or {"": {"value": np.nan, "low": np.nan, "high": np.nan}}).items()
         ]
 
     @property
     def base_parameters(self):
-        """A table: assumed and fitted parameters of the layers."""
+        """A table: assumed and fitted parameters of the layers; where `at_least` is set only `low` is known."""
         return _data.frame(self.result["base_parameters"])
 
     @property

@@ -15,6 +15,12 @@ pub enum QualityKind {
     /// While the needle advances the force decreases, by 8 times its noise and 3 times its increase, and is negative.
     /// Blocking. Numbers: `wrong_n`, `right_n`.
     Reversed,
+    /// Over the motion the force does work on the needle, more than 0.3 of the sum of its absolute values: the position has the
+    /// other sign. Blocking. Numbers: `work_j`, `absolute_j`.
+    ReversedPosition,
+    /// The position advances by less than 5 % of its travel: a retraction alone, or a position of the other sign. Blocking.
+    /// Numbers: `advance_m`, `travel_m`.
+    OnlyRetraction,
     /// Means over 0.1 s and more are uncorrelated like noise: no contact with tissue. Blocking. Numbers: `low_n`, `high_n`.
     InAir,
     /// Fewer than 50 samples. Blocking. Numbers: `samples`, `least`.
@@ -35,8 +41,8 @@ pub enum QualityKind {
     /// Units that names, a row of units or types gave were applied, or components projected on an axis.
     Converted,
     /// A quantity looks as if it had another unit: position range above 2 m, speed above 1 m/s (99th percentile), force above
-    /// 500 N (not blocking), median interval above 1 s, or a measured velocity that is not the slope of the position. Blocking, except for
-    /// the interval and for a velocity within 20 times the slope. Numbers: `value`, `limit`.
+    /// 500 N (not blocking), median interval of 1 s and more, or a measured velocity that is not the slope of the position.
+    /// Blocking, except for a velocity within 20 times the slope. Numbers: `value`, `limit`.
     UnitMixUp,
     /// Intervals above five median intervals. Numbers: `count`, `largest_s`, `at_s` (start of the largest),
     /// `median_interval_s`.

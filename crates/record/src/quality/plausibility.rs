@@ -130,17 +130,7 @@ const AIR_SHARE: f64 = 0.02;
 
 /// A force that decreases while the needle advances.
 pub(super) fn reversed_force<A: SampleStream>(recording: &A) -> Result<Option<QualityNote>, A::Error> {
-    let samples = recording.len();
-    let first = ((AIR_SHARE * samples as f64) as usize).clamp(5, samples.max(5));
-    let rest_n = median(|take| {
-        let mut left = first;
-        recording.for_each_value(Quantity::Force, |force_n| {
-            if left > 0 {
-                left -= 1;
-                take(force_n);
-            }
-        })
-    })?;
+    let rest_n = rest_n(recording)?;
     let mut count = 0_usize;
     for_each_advancing(recording, |_, _| count += 1)?;
     if count < MIN_SAMPLES {
@@ -167,6 +157,21 @@ pub(super) fn reversed_force<A: SampleStream>(recording: &A) -> Result<Option<Qu
     Ok(Some(QualityNote::blocking(QualityKind::Reversed, message, numbers)))
 }
 
+/// Median force of the first samples.
+pub(super) fn rest_n<A: SampleStream>(recording: &A) -> Result<f64, A::Error> {
+    let samples = recording.len();
+    let first = ((AIR_SHARE * samples as f64) as usize).clamp(5, samples.max(5));
+    median(|take| {
+        let mut left = first;
+        recording.for_each_value(Quantity::Force, |force_n| {
+            if left > 0 {
+                left -= 1;
+                take(force_n);
+            }
+        })
+    })
+}
+
 /// Calls `each` with position and force of the samples at which the needle advances.
 fn for_each_advancing<A: SampleStream>(
     recording: &A,
@@ -188,7 +193,7 @@ fn median<E>(pass: impl FnMut(&mut dyn FnMut(f64)) -> Result<(), E>) -> Result<f
 }
 
 /// Standard deviation of the noise from differences of consecutive samples, whose median motion and ruptures hardly change.
-fn noise_n<A: SampleStream>(recording: &A) -> Result<f64, A::Error> {
+pub(super) fn noise_n<A: SampleStream>(recording: &A) -> Result<f64, A::Error> {
     let step_n =
         median(|take| recording.for_each_pair(Quantity::Force, |before, now| take((now - before).abs())))?;
     Ok(step_n * stylet_stats::MAD_TO_SD / core::f64::consts::SQRT_2)

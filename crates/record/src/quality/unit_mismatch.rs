@@ -13,8 +13,10 @@ const MAX_RANGE_M: f64 = 2.0;
 const MAX_SPEED_MPS: f64 = 1.0;
 /// Most force (N).
 const MAX_FORCE_N: f64 = 500.0;
-/// Most sampling interval (s).
-const MAX_INTERVAL_S: f64 = 1.0;
+/// Most sampling interval (s): slower samples show no rupture.
+const MAX_INTERVAL_S: f64 = 0.999;
+/// Usual sampling intervals (s).
+const USUAL_INTERVAL_S: core::ops::RangeInclusive<f64> = 5e-5..=0.2;
 /// Factor between measured velocity and slope of the position (or its inverse) above which the note is blocking.
 const BLOCKING_FACTOR: f64 = 20.0;
 /// Quantile of speed and force, so that single bad samples do not count.
@@ -70,14 +72,32 @@ pub(super) fn unit_mix_ups<A: SampleStream>(
     note_above(
         interval_s,
         MAX_INTERVAL_S,
-        false,
+        true,
         format!(
-            "the typical sampling interval is {interval_s:.4} s: the time looks like milliseconds (scale 1e-3) or microseconds \
-         (scale 1e-6)"
+            "the typical sampling interval is {interval_s:.4} s: {}",
+            time_unit_remedy(recording.at(Quantity::Time, 0)?, interval_s)
         ),
     );
     notes.extend(velocity_against_position(recording)?);
     Ok(notes)
+}
+
+/// What a sampling interval of a second and more (s) may mean, and what to do; the recording begins at `start_s`.
+fn time_unit_remedy(start_s: f64, interval_s: f64) -> String {
+    // The sample number.
+    if (interval_s - 1.0).abs() < 1e-9 && start_s.fract() == 0.0 {
+        return "the time looks like the number of the sample; give the rate in a column map: `time` with `scale: 0.005` for 200 Hz"
+            .to_owned();
+    }
+    let units =
+        [("milliseconds", "1e-3", 1e-3), ("microseconds", "1e-6", 1e-6), ("nanoseconds", "1e-9", 1e-9)];
+    let unit = units.into_iter().find(|(_, _, scale)| USUAL_INTERVAL_S.contains(&(scale * interval_s)));
+    unit.map_or_else(
+        || "slower than a rupture; record at 50 Hz and more".to_owned(),
+        |(name, scale, _)| {
+            format!("the time looks like {name}; give a column map with `scale: {scale}` in its `time`")
+        },
+    )
 }
 
 /// The note on a measured velocity whose factor to the slope of the position (least squares) is not near one.

@@ -47,6 +47,7 @@ fn diagnosis() -> Diagnosis {
         parameters: BTreeMap::from([("c_n_per_m".to_owned(), Estimate { value: 8.0, low: 7.0, high: 9.5 })]),
         gain_nats: 0.0,
         share: 0.0,
+        ..Cause::default()
     }];
     d
 }

@@ -1,6 +1,7 @@
 //! Diagnosis of many indented specimens.
 
 use super::{SpecimenReport, relaxation};
+use crate::claims::{self, Context};
 use crate::diagnosis_json::{
     Cause, DataQualityNote, Diagnosis, Estimate, Gain, NoiseReport, ResidualStructureReport, Verdict,
 };
@@ -43,11 +44,15 @@ impl SpecimenReport {
                     .fold(0.0, f64::max),
                 parameters: of(effect),
                 gain_nats: 0.0,
+                ..Cause::default()
             })
             .collect();
         let last = self.candidates.iter().rfind(|r| r.kept).map_or(0.0, |r| r.held_out_n);
         let noise = stylet_stats::median_of(recordings.iter().map(SegmentedRecording::noise_n));
-        Diagnosis {
+        let mut diagnosis = Diagnosis {
+            agrees: false,
+            findings: Vec::new(),
+            partial: None,
             negligible: Vec::new(),
             verdict: if causes.is_empty() { Verdict::None } else { Verdict::Named },
             causes,
@@ -58,6 +63,7 @@ impl SpecimenReport {
                 recordings: recordings.iter().map(|r| r.name.clone()).collect(),
                 rmse_before_n: self.candidates.first().map_or(0.0, |r| r.held_out_n),
                 rmse_after_n: last,
+rmse_given_scatter_n: 0.0,
                 floor_n: noise,
                 per_recording_n: Vec::new(),
             },
@@ -79,7 +85,9 @@ impl SpecimenReport {
             advice: vec![
                 "The recordings contain neither a retraction nor a puncture: friction and puncture are not identifiable.".to_owned(),
             ],
-        }
+        };
+        claims::apply(&mut diagnosis, &Context::default());
+        diagnosis
     }
 }
 

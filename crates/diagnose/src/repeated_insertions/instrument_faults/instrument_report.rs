@@ -68,6 +68,7 @@ impl DetectedFault {
             parameters: self.parameters.clone(),
             gain_nats: 0.0,
             share: 0.0,
+            ..Cause::default()
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Tables of the causes, the re-fitted base parameters, negligible effects and effects that cannot be identified.
 
+use super::summary_sentence::lower_limit;
 use crate::page_model::{Cell, Section, Status, Table};
 use crate::pages::formatting::BASE_LAW_EQUATIONS;
 use std::fmt::Write as _;
@@ -33,7 +34,12 @@ pub(super) fn causes(d: &Diagnosis) -> Section {
                 first(significant(c.confidence, 3)),
                 first(if c.share > 0.0 { format!("{:.0} %", 100.0 * c.share) } else { "-".to_owned() }),
                 Cell::text(path.clone()),
-                Cell::number(format!("{} {}", number(e.value), unit(path))),
+                Cell::number(format!(
+                    "{} {}{}",
+                    number(e.value),
+                    unit(path),
+                    if c.at_bound.contains(path) { ", at its bound" } else { "" }
+                )),
                 Cell::number(format!("{} to {}", number(e.low), number(e.high))),
             ]);
         }
@@ -75,8 +81,12 @@ pub(super) fn base_parameters(scenario: &Scenario, d: &Diagnosis) -> Section {
                 Cell::text(if b.layer > 0 { format!("layer {}", b.layer) } else { "tissue".to_owned() }),
                 Cell::text(b.name.clone()),
                 Cell::number(number(b.assumed)),
-                Cell::number(number(b.value)),
-                Cell::number(format!("{} to {}", number(b.low), number(b.high))),
+                Cell::number(if b.at_least { lower_limit(b) } else { number(b.value) }),
+                Cell::number(if b.at_least {
+                    "not reached".to_owned()
+                } else {
+                    format!("{} to {}", number(b.low), number(b.high))
+                }),
                 Cell::number(change(b)).status(status),
             ]
         })
@@ -132,7 +142,11 @@ fn change(b: &BaseParameter) -> String {
     } else {
         format!("{:+.1} %", rounded(100.0 * (b.value / b.assumed - 1.0), 10.0))
     };
-    if b.at_bound { format!("{by}, at its bound") } else { by }
+    match (b.at_least, b.at_bound) {
+        (true, _) => "only a lower limit".to_owned(),
+        (false, true) => format!("{by}, at its bound"),
+        (false, false) => by,
+    }
 }
 
 /// Effects that were detected but are negligible.

@@ -5,7 +5,9 @@ mod effect_search_steps;
 mod residual_charts;
 mod summary_sentence;
 
-pub use summary_sentence::{recording_differences, summary_sentence};
+pub use summary_sentence::{
+    findings, general_forms, lower_limits, partial_model, recording_differences, summary_sentence,
+};
 
 use crate::page_model::{Page, Section, Status, Tile};
 use crate::pages::formatting::data_quality_table;
@@ -18,6 +20,7 @@ use residual_charts::{
 };
 use std::fmt::Write as _;
 use stylet_diagnose::DiagnosisResult;
+use stylet_diagnose::claims::SIGNIFICANT_P_VALUE;
 use stylet_diagnose::diagnosis_json::{Diagnosis, Verdict};
 use stylet_diagnose::report_curves::recording_curves;
 use stylet_scenario::Scenario;
@@ -78,12 +81,18 @@ fn verdict(d: &Diagnosis) -> Section {
         let parameters = c
             .parameters
             .iter()
-            .map(|(p, e)| format!("{p} = {}", significant(e.value, 4)))
+            .map(|(p, e)| {
+                let bound = if c.at_bound.contains(p) { " (at its bound)" } else { "" };
+                format!("{p} = {}{bound}", significant(e.value, 4))
+            })
             .collect::<Vec<_>>()
             .join(", ");
         let mut detail = format!("{parameters}; confidence {}", significant(c.confidence, 2));
         if !c.equivalent.is_empty() {
             let _ = write!(detail, "; not separable from: {}", c.equivalent.join(", "));
+        }
+        for remark in general_forms(c).iter().chain(&c.remark) {
+            let _ = write!(detail, "; {remark}");
         }
         tiles.push(Tile::new("Cause", c.effect.replace('_', " "), detail));
     }
@@ -95,16 +104,20 @@ fn verdict(d: &Diagnosis) -> Section {
         format!("{} → {} N", significant(g.rmse_before_n, 3), significant(g.rmse_after_n, 3)),
         format!("RMS of {what}; noise {} N", significant(g.floor_n, 3)),
     ));
-    let status = if d.residual_structure.p_value < 1e-3 { Status::Warn } else { Status::Good };
+    let status = if d.residual_structure.p_value < SIGNIFICANT_P_VALUE { Status::Warn } else { Status::Good };
     tiles.push(
         Tile::new(
             "Remaining residual",
-            if d.residual_structure.p_value < 1e-3 { "structure" } else { "noise" },
+            if d.residual_structure.p_value < SIGNIFICANT_P_VALUE { "structure" } else { "noise" },
             format!("{} for a residual of noise alone", p_value(d.residual_structure.p_value)),
         )
         .status(status),
     );
     let mut section = Section::new("Verdict").tiles(tiles);
+    let warnings: Vec<String> = findings(d).into_iter().chain(partial_model(d)).collect();
+    if !warnings.is_empty() {
+        section = section.warnings(warnings);
+    }
     for a in &d.advice {
         section = section.warnings(vec![a.clone()]);
     }

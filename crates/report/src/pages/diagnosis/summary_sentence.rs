@@ -1,6 +1,7 @@
 //! A diagnosis in one sentence.
 
-use stylet_diagnose::diagnosis_json::{Cause, Diagnosis, Verdict};
+use stylet_diagnose::claims::{contradicts, parameter_name};
+use stylet_diagnose::diagnosis_json::{BaseParameter, Cause, Diagnosis, FindingKind, Verdict};
 use stylet_record::QualityKind;
 use stylet_stats::number_format::significant;
 
@@ -8,7 +9,7 @@ use stylet_stats::number_format::significant;
 #[must_use]
 pub fn summary_sentence(d: &Diagnosis) -> String {
     let outliers = outlier_recordings(d);
-    let mut text = verdict(d, outliers.is_empty());
+    let mut text = verdict(d);
     if !outliers.is_empty() {
         let are = if outliers.len() == 1 { "is" } else { "are" };
         text += &format!(" But {} {are} not like the other recordings: see the note.", outliers.join(", "));
@@ -16,13 +17,59 @@ pub fn summary_sentence(d: &Diagnosis) -> String {
     text
 }
 
-fn verdict(d: &Diagnosis, agrees: bool) -> String {
+/// The findings that contradict agreement or limit the confidence, one sentence each.
+#[must_use]
+pub fn findings(d: &Diagnosis) -> Vec<String> {
+    d.findings.iter().filter(|f| f.kind != FindingKind::OutlierRecording).map(|f| f.message.clone()).collect()
+}
+
+/// What the best model beside an unmodelled force explains.
+#[must_use]
+pub fn partial_model(d: &Diagnosis) -> Option<String> {
+    let p = d.partial.as_ref()?;
+    Some(format!(
+        "the best partial model, with {}, removes {} % of the misfit; extended.ron holds it",
+        p.effects.join(", "),
+        significant(100.0 * p.share, 2)
+    ))
+}
+
+/// Effects that these recordings cannot separate from a simpler one that is named.
+#[must_use]
+pub fn general_forms(c: &Cause) -> Option<String> {
+    (!c.general_forms.is_empty()).then(|| {
+        format!(
+            "{} or {}: these recordings cannot separate them; the simpler one is kept, and the confidence is shared",
+            c.effect,
+            c.general_forms.join(" or ")
+        )
+    })
+}
+
+/// Puncture forces that no recording reached, in words.
+#[must_use]
+pub fn lower_limits(d: &Diagnosis) -> Vec<String> {
+    let limits = d.base_parameters.iter().filter(|b| b.at_least);
+    limits.map(|b| format!("{}: {}, never reached", parameter_name(b), lower_limit(b))).collect()
+}
+
+/// A parameter that is only bounded from below.
+pub(super) fn lower_limit(b: &BaseParameter) -> String {
+    format!("at least {} N", significant(b.low, 3))
+}
+
+fn verdict(d: &Diagnosis) -> String {
     let names = || d.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>().join(" and ");
     match d.verdict {
-        Verdict::None if agrees => {
+        Verdict::None if d.agrees => {
             "The simulation agrees with the data: no effect is needed beyond the base law.".to_owned()
         }
-        Verdict::None => "No effect is needed beyond the base law.".to_owned(),
+        Verdict::None => {
+            let first =
+                d.findings.iter().find(|f| contradicts(f.kind) && f.kind != FindingKind::OutlierRecording);
+            let but = first.map_or_else(String::new, |f| format!(", but {}", f.message));
+            format!("No effect of the library is needed beyond the base law{but}.")
+        }
         Verdict::Named => format!("The simulation lacks {}.", names()),
         Verdict::Ambiguous => {
             let class = |c: &Cause| {

@@ -9,10 +9,12 @@ mod recording_variation;
 pub use fitted_law::ablation_figure;
 
 use crate::page_model::{Page, Section, Status, Tile};
+use crate::pages::diagnosis::findings;
 use crate::pages::formatting::{data_quality_table, three_decimals};
 use fitted_law::{causes, extended_law};
 use held_out_prediction::{held_out_predictions, residual_charts};
 use recording_variation::{between_recordings, measurement_chain};
+use stylet_diagnose::claims::contradicts;
 use stylet_diagnose::diagnosis_json::Verdict;
 use stylet_diagnose::repeated_insertions::SegmentedRecording;
 use stylet_diagnose::repeated_insertions::dataset::Dataset;
@@ -55,7 +57,9 @@ pub fn page(
 pub fn summary_sentence(study: &SetDiagnosis) -> String {
     let d = &study.diagnosis;
     let names: Vec<&str> = d.causes.iter().map(|c| c.effect.as_str()).collect();
-    match (d.verdict, names.is_empty()) {
+    let finding = d.findings.iter().find(|f| contradicts(f.kind));
+    let but = finding.map_or_else(String::new, |f| format!(" But {}.", f.message));
+    let text = match (d.verdict, names.is_empty()) {
         (Verdict::Unknown, true) => {
             "The insertions hold structure that no effect of the library explains.".to_owned()
         }
@@ -65,7 +69,8 @@ pub fn summary_sentence(study: &SetDiagnosis) -> String {
         ),
         (_, true) => "The base law predicts new insertions as well as any extension of it.".to_owned(),
         (_, false) => format!("The simulation lacks {}.", names.join(", ")),
-    }
+    };
+    text + &but
 }
 
 fn verdict(study: &SetDiagnosis) -> Section {
@@ -95,7 +100,9 @@ fn verdict(study: &SetDiagnosis) -> Section {
         .status(if (0.8..=0.97).contains(&m.coverage) { Status::Good } else { Status::Warn }),
         Tile::new("Causes", study.diagnosis.causes.len().to_string(), summary_sentence(study)),
     ];
-    Section::new("Verdict").tiles(tiles)
+    let section = Section::new("Verdict").tiles(tiles);
+    let findings = findings(&study.diagnosis);
+    if findings.is_empty() { section } else { section.warnings(findings) }
 }
 
 fn quality(study: &SetDiagnosis) -> Section {

@@ -1,0 +1,230 @@
+//! What the data support: one rule for agreement, verdict and confidence.
+//!
+//! The rule reads a finished diagnosis: the errors of held-out predictions, the noise, the residual tests, the bounds of the
+//! parameters and the scatter between recordings. Whatever it finds stands in [`Diagnosis::findings`], so that no sentence
+//! contradicts a number beside it.
+
+use crate::diagnosis_json::{BaseParameter, Diagnosis, Finding, FindingKind, Gain, Verdict};
+use stylet_record::{QualityKind, Recording};
+use stylet_stats::number_format::{p_value, significant};
+
+/// Predictions that miss by more than this factor above the noise, with the scatter between recordings known, contradict the
+/// model.
+const MAX_ERROR_RATIO: f64 = 2.0;
+/// The residual depends on a feature below this p-value.
+pub const SIGNIFICANT_P_VALUE: f64 = 1e-3;
+/// Scatter between recordings that no single model describes: standard deviation of puncture force or friction, relative.
+const MAX_RELATIVE_SCATTER: f64 = 0.3;
+/// The same for rupture depth and surface, in m.
+const MAX_SCATTER_M: f64 = 5e-3;
+/// The noise is far above its reference from this factor on: sensors of one kind differ by less.
+const MAX_NOISE_RATIO: f64 = 5.0;
+/// Largest confidence of a cause beside a finding that contradicts the model.
+pub const MAX_CONFIDENCE_CONTRADICTED: f64 = 0.8;
+/// Largest confidence of a cause from one recording, which no prediction confirmed, or from recordings of one motion, under
+/// which causes that depend on time, depth or speed may look alike.
+const MAX_CONFIDENCE_FEW: f64 = 0.9;
+/// Recordings have the same motion when their positions differ by at most this share of the travel (RMS).
+const SAME_MOTION_SHARE: f64 = 0.01;
+/// Positions that are compared.
+const MOTION_POINTS: usize = 200;
+
+/// What the rule needs besides the diagnosis.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Context {
+    /// Whether all of several recordings have the same motion.
+    pub one_motion: bool,
+    /// Noise of the scenario's sensor in N.
+    pub sensor_noise_n: Option<f64>,
+    /// Noise of the samples in air in N.
+    pub air_noise_n: Option<f64>,
+    /// Resolution of the recorded force in N: an error of this size is no misfit.
+    pub resolution_n: f64,
+}
+
+/// Adds the findings to a diagnosis, and sets agreement, verdict and confidences accordingly.
+pub(crate) fn apply(d: &mut Diagnosis, context: &Context) {
+    d.findings = findings(d, context);
+    let contradicted = d.findings.iter().any(|f| contradicts(f.kind));
+    let mispredicted = d.findings.iter().any(|f| f.kind == FindingKind::PredictionError);
+    if d.verdict == Verdict::None && mispredicted {
+        d.verdict = Verdict::Unknown;
+    }
+    d.agrees = d.verdict == Verdict::None && !contradicted;
+    let most = max_confidence(&d.findings);
+    for cause in &mut d.causes {
+        cause.confidence = cause.confidence.min(most);
+    }
+}
+
+/// Whether a finding contradicts agreement.
+#[must_use]
+pub fn contradicts(kind: FindingKind) -> bool {
+    !matches!(kind, FindingKind::OneRecording | FindingKind::OneMotion)
+}
+
+/// Largest confidence that these findings allow.
+fn max_confidence(findings: &[Finding]) -> f64 {
+    let most = |f: &Finding| match f.kind {
+        FindingKind::OneRecording | FindingKind::OneMotion => MAX_CONFIDENCE_FEW,
+        FindingKind::OutlierRecording => 1.0,
+        _ => MAX_CONFIDENCE_CONTRADICTED,
+    };
+    findings.iter().map(most).fold(1.0, f64::min)
+}
+
+fn findings(d: &Diagnosis, context: &Context) -> Vec<Finding> {
+    let mut out = Vec::new();
+    let mut add = |kind: FindingKind, message: String| out.push(Finding { kind, message });
+    if let Some(message) = prediction_error(&d.gain, context.resolution_n) {
+        add(FindingKind::PredictionError, message);
+    }
+    let structure = &d.residual_structure;
+    if structure.p_value < SIGNIFICANT_P_VALUE {
+        let on = structure.depends_on.join(", ");
+        add(
+            FindingKind::ResidualStructure,
+            format!("the residual depends on {on} ({})", p_value(structure.p_value)),
+        );
+    }
+    let bounds = parameters_at_bound(d);
+    if !bounds.is_empty() {
+        let stand = if bounds.len() == 1 { "is at its bound" } else { "are at their bounds" };
+        add(
+            FindingKind::AtBound,
+            format!("{} {stand}: the data ask for another value, or do not determine one", bounds.join(", ")),
+        );
+    }
+    if let Some(message) = scatter(d) {
+        add(FindingKind::Scatter, message);
+    }
+    if let Some(message) = noise_level(d.gain.floor_n, context) {
+        add(FindingKind::NoiseLevel, message);
+    }
+    for q in d.data_quality.iter().filter(|q| q.note.kind == QualityKind::OutlierRecording) {
+        add(FindingKind::OutlierRecording, format!("{} is not like the other recordings", q.recording));
+    }
+    let few = match d.gain.recordings.len() {
+        1 => Some((FindingKind::OneRecording, "one recording: the model predicted no other")),
+        _ if context.one_motion => Some((
+            FindingKind::OneMotion,
+            "all recordings have the same motion: causes that differ under another one look alike",
+        )),
+        _ => None,
+    };
+    if let Some((kind, what)) = few {
+        let limit = match d.causes.is_empty() {
+            true => String::new(),
+            false => format!(", so no cause has a confidence above {MAX_CONFIDENCE_FEW}"),
+        };
+        add(kind, format!("{what}{limit}"));
+    }
+    out
+}
+
+/// Predictions that miss by more than noise and scatter between recordings explain.
+fn prediction_error(g: &Gain, resolution_n: f64) -> Option<String> {
+    let floor_n = g.floor_n.max(resolution_n);
+    (g.rmse_given_scatter_n > MAX_ERROR_RATIO * floor_n && floor_n > 0.0).then(|| {
+        let what = if g.held_out { "held-out recordings are predicted" } else { "the recording is fitted" };
+        format!(
+            "{what} to {} N, {} times the noise of {} N",
+            significant(g.rmse_given_scatter_n, 3),
+            significant(g.rmse_given_scatter_n / floor_n, 2),
+            significant(floor_n, 3)
+        )
+    })
+}
+
+/// Parameters at their bounds, in words.
+fn parameters_at_bound(d: &Diagnosis) -> Vec<String> {
+    let base = d.base_parameters.iter().filter(|b| b.at_bound && !b.at_least).map(parameter_name);
+    let of_causes =
+        d.causes.iter().flat_map(|c| c.at_bound.iter().map(|path| format!("{path} of {}", c.effect)));
+    base.chain(of_causes).collect()
+}
+
+/// Name of a base parameter with its layer.
+#[must_use]
+pub fn parameter_name(b: &BaseParameter) -> String {
+    if b.layer == 0 { b.name.clone() } else { format!("{} of layer {}", b.name, b.layer) }
+}
+
+/// Scatter between recordings that one model does not describe.
+fn scatter(d: &Diagnosis) -> Option<String> {
+    let s = &d.random_effect_sd;
+    let mut what = Vec::new();
+    for (name, share) in [("puncture forces", s.puncture), ("friction", s.friction)] {
+        if share >= MAX_RELATIVE_SCATTER {
+            what.push(format!("{name} by {} %", significant(100.0 * share, 2)));
+        }
+    }
+    for (name, m) in [("rupture depths", s.rupture_depth_m), ("the surface", s.surface_m)] {
+        if m >= MAX_SCATTER_M {
+            what.push(format!("{name} by {} mm", significant(1e3 * m, 2)));
+        }
+    }
+    (!what.is_empty()).then(|| {
+        format!("recordings differ too much for one model: {} (one standard deviation)", what.join(", "))
+    })
+}
+
+/// A noise estimate far above that of the sensor or that in air.
+fn noise_level(noise_n: f64, context: &Context) -> Option<String> {
+    let references =
+        [(context.sensor_noise_n, "that of the scenario's sensor"), (context.air_noise_n, "that in air")];
+    let above = |(reference, what): (Option<f64>, &str)| {
+        let reference_n = reference?.max(context.resolution_n);
+        (reference_n > 0.0 && noise_n > MAX_NOISE_RATIO * reference_n).then(|| {
+            format!(
+                "the noise of {} N is {} times {what}, {} N",
+                significant(noise_n, 3),
+                significant(noise_n / reference_n, 2),
+                significant(reference_n, 3)
+            )
+        })
+    };
+    references.into_iter().find_map(above)
+}
+
+/// Whether two or more recordings all have the same motion.
+pub(crate) fn have_one_motion(recordings: &[Recording]) -> bool {
+    let Some((first, others)) = recordings.split_first().filter(|(_, others)| !others.is_empty()) else {
+        return false;
+    };
+    let reference = resampled(first);
+    let travel_m = range(&reference);
+    let duration_s = duration(first);
+    others.iter().all(|r| {
+        let z = resampled(r);
+        let square: f64 =
+            z.iter().zip(&reference).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / MOTION_POINTS as f64;
+        (duration(r) / duration_s.max(1e-9) - 1.0).abs() < SAME_MOTION_SHARE
+            && square.sqrt() <= SAME_MOTION_SHARE * travel_m.max(range(&z))
+    })
+}
+
+fn duration(r: &Recording) -> f64 {
+    r.time_s.last().zip(r.time_s.first()).map_or(0.0, |(b, a)| b - a)
+}
+
+fn range(x: &[f64]) -> f64 {
+    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    (high - low).max(0.0)
+}
+
+/// Positions at evenly spaced times.
+fn resampled(r: &Recording) -> Vec<f64> {
+    let (start_s, duration_s) = (r.time_s.first().copied().unwrap_or(0.0), duration(r));
+    let last = r.len().saturating_sub(1);
+    (0..MOTION_POINTS)
+        .map(|k| {
+            let t = start_s + duration_s * k as f64 / (MOTION_POINTS - 1) as f64;
+            let i = r.time_s.partition_point(|x| *x < t).min(last);
+            r.position_m.get(i).copied().unwrap_or(0.0)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;

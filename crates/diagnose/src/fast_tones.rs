@@ -1,0 +1,324 @@
+//! Tones above the band of the block means: found, fitted and removed at the sampling rate.
+//!
+//! A mean over 20 ms removes 50 Hz and its multiples exactly, and attenuates every tone above half the rate of the blocks;
+//! the tests on block means then take it for noise. The samples are therefore tested before they are averaged. Mains
+//! drifts, so amplitude and phase are fitted in windows of one second; the frequency and, where the phase is stable, the
+//! amplitude come from whole recordings, with the Cramér-Rao bounds of a sinusoid in noise (Rife and Boorstyn 1974).
+
+use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty};
+use core::f64::consts::{PI, TAU};
+use rayon::prelude::*;
+use stylet_record::Recording;
+use stylet_stats::order_statistics::median_of;
+use stylet_stats::spectrum::{PADDING, PowerSpectrum, SampledSignal};
+
+/// Length in s of the windows in which amplitude and phase are constant.
+const WINDOW_S: f64 = 1.0;
+/// Largest number of tones that are removed.
+const MAX_TONES: usize = 6;
+/// A tone is tested when its power exceeds the median of its surroundings by this factor.
+const MIN_POWER_RATIO: f64 = 8.0;
+/// Half width of the surroundings, in frequency resolutions.
+const SURROUNDING_RESOLUTIONS: usize = 60;
+/// A smaller amplitude, in standard deviations of the samples within their blocks, is negligible.
+const MIN_AMPLITUDE_SD: f64 = 0.15;
+/// Share of a tone's power that is in phase over whole recordings, from which its phase is stable.
+const MIN_COHERENCE: f64 = 0.9;
+/// Phases of two recordings agree within this many standard deviations.
+const PHASE_AGREEMENT_SD: f64 = 4.0;
+
+/// A sample belongs to a rupture or a velocity jump from this many median deviations on; the peak of a tone has 1.4.
+const MAX_DEVIATION: f64 = 8.0;
+
+/// A value with its standard deviation.
+pub(crate) type WithSd = (f64, f64);
+
+/// A tone that was removed.
+#[derive(Clone, Debug)]
+pub(crate) struct FastTone {
+    /// Frequency in Hz.
+    pub frequency_hz: WithSd,
+    /// Amplitude in N.
+    pub amplitude_n: WithSd,
+    /// Phase at time zero in rad; of the first recording, with an infinite deviation, where recordings differ.
+    pub phase_rad: WithSd,
+    /// Gain of its removal in nats, beyond the penalty of its parameters.
+    pub gain_nats: f64,
+}
+
+/// Samples of one recording without their smooth course.
+struct Samples<'a> {
+    time_s: &'a [f64],
+    step_s: f64,
+    /// Deviation from the moving average; 0 for excluded samples.
+    fast_n: Vec<f64>,
+    used: Vec<bool>,
+    /// Number of samples of the moving average.
+    length: usize,
+}
+
+/// Removes the tones above half the rate of blocks of `block_s` from the forces; samples marked in `exclude` are not used.
+pub(crate) fn remove_fast_tones(
+    recordings: &mut [Recording],
+    exclude: &[Vec<bool>],
+    block_s: f64,
+) -> Vec<FastTone> {
+    let step_s = recordings.iter().map(median_step_s).next().unwrap_or(block_s);
+    let per_block = ((block_s / step_s).round() as usize).max(1);
+    if per_block < 2 {
+        return Vec::new();
+    }
+    let lowest_hz = 0.5 / (per_block as f64 * step_s);
+    let mut tones: Vec<FastTone> = Vec::new();
+    while tones.len() < MAX_TONES {
+        let samples: Vec<Samples> = recordings
+            .par_iter()
+            .zip(exclude)
+            .map(|(r, x)| Samples::new(r, x, 2 * per_block + 1))
+            .filter(|s| (s.step_s / step_s - 1.0).abs() < 0.01)
+            .collect();
+        let Some((tone, waves)) = strongest_tone(&samples, lowest_hz) else { break };
+        let mut waves = waves.into_iter();
+        for r in recordings.iter_mut().filter(|r| (median_step_s(r) / step_s - 1.0).abs() < 0.01) {
+            if let Some(wave) = waves.next() {
+                r.force_n.iter_mut().zip(wave).for_each(|(f, w)| *f -= w);
+            }
+        }
+        tones.push(tone);
+    }
+    tones
+}
+
+fn median_step_s(r: &Recording) -> f64 {
+    median_of(r.time_s.windows(2).map(|w| w[1] - w[0])).max(1e-9)
+}
+
+impl<'a> Samples<'a> {
+    fn new(r: &'a Recording, exclude: &[bool], length: usize) -> Self {
+        let n = r.len();
+        let used: Vec<bool> = (0..n).map(|k| !exclude.get(k).copied().unwrap_or(false)).collect();
+        let mut sums = Vec::with_capacity(n + 1);
+        sums.push(0.0);
+        r.force_n.iter().for_each(|f| sums.push(sums.last().copied().unwrap_or(0.0) + f));
+        let fast_n = (0..n)
+            .map(|k| {
+                // Symmetric, so that a slope cancels.
+                let half = (length / 2).min(k).min(n - 1 - k);
+                let (lo, hi) = (k - half, k + half + 1);
+                if used[k] { r.force_n[k] - (sums[hi] - sums[lo]) / (hi - lo) as f64 } else { 0.0 }
+            })
+            .collect();
+        let mut samples = Self { time_s: &r.time_s, step_s: median_step_s(r), fast_n, used, length };
+        samples.exclude_steps();
+        samples
+    }
+
+    /// Excludes the samples around ruptures and velocity jumps, which are no part of a tone.
+    fn exclude_steps(&mut self) {
+        let limit_n = MAX_DEVIATION * median_of(self.fast_n.iter().map(|x| x.abs()));
+        let steps: Vec<usize> = (0..self.fast_n.len()).filter(|k| self.fast_n[*k].abs() > limit_n).collect();
+        for k in steps {
+            let (lo, hi) =
+                (k.saturating_sub(self.length / 2), (k + self.length / 2 + 1).min(self.fast_n.len()));
+            self.used[lo..hi].fill(false);
+            self.fast_n[lo..hi].fill(0.0);
+        }
+    }
+
+    /// Share of a tone's amplitude that the subtraction of the moving average keeps.
+    fn response(&self, hz: f64) -> f64 {
+        let half = PI * hz * self.step_s;
+        let n = self.length as f64;
+        let below = libm::sin(half);
+        let kept = if below.abs() < 1e-9 { 1.0 } else { libm::sin(n * half) / (n * below) };
+        1.0 - kept
+    }
+
+    /// Coefficients of sine and cosine over a range of samples, and the number of samples used.
+    fn sinusoid(&self, hz: f64, range: std::ops::Range<usize>) -> ([f64; 2], f64) {
+        let (mut ss, mut sc, mut cc, mut s, mut c, mut n) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+        for k in range.filter(|k| self.used[*k]) {
+            let (a, b) = libm::sincos(TAU * hz * self.time_s[k]);
+            (ss, sc, cc) = (ss + a * a, sc + a * b, cc + b * b);
+            (s, c, n) = (s + a * self.fast_n[k], c + b * self.fast_n[k], n + 1.0);
+        }
+        // At half the sampling rate only one of the two columns is determined.
+        let ridge = 1e-3 * n;
+        let det = (ss + ridge) * (cc + ridge) - sc * sc;
+        if det <= 0.0 {
+            return ([0.0; 2], n);
+        }
+        let share = (1.0 + 2.0 * ridge / f64::max(n, 1.0)) / self.response(hz);
+        ([share * ((cc + ridge) * s - sc * c) / det, share * ((ss + ridge) * c - sc * s) / det], n)
+    }
+
+    /// Ranges of samples of about one second.
+    fn windows(&self) -> Vec<std::ops::Range<usize>> {
+        let n = self.fast_n.len();
+        let count = ((n as f64 * self.step_s / WINDOW_S).round() as usize).max(1);
+        (0..count).map(|w| w * n / count..(w + 1) * n / count).collect()
+    }
+
+    fn duration_s(&self) -> f64 {
+        self.time_s.last().zip(self.time_s.first()).map_or(0.0, |(b, a)| b - a)
+    }
+
+    fn mid_s(&self) -> f64 {
+        self.time_s.last().zip(self.time_s.first()).map_or(0.0, |(b, a)| 0.5 * (a + b))
+    }
+}
+
+/// Power of all recordings at one frequency, each with its own phase.
+fn power(samples: &[Samples], hz: f64) -> f64 {
+    let of = |s: &Samples| {
+        let ([a, b], n) = s.sinusoid(hz, 0..s.fast_n.len());
+        (a * a + b * b) * n
+    };
+    samples.par_iter().map(of).sum()
+}
+
+/// The strongest significant tone from `lowest_hz` on, and its force (N) in every recording.
+fn strongest_tone(samples: &[Samples], lowest_hz: f64) -> Option<(FastTone, Vec<Vec<f64>>)> {
+    let columns: Vec<SampledSignal> = samples
+        .iter()
+        .map(|s| SampledSignal { time_s: s.time_s, values: s.fast_n.clone(), step_s: s.step_s })
+        .collect();
+    let spectrum = PowerSpectrum::estimate(&columns, PADDING);
+    let (peak, floor) = spectral_peak(&spectrum, lowest_hz)?;
+    let first = samples.first()?;
+    let hz = refined(samples, peak as f64 * spectrum.bin_hz, spectrum.bin_hz, 0.5 / first.step_s);
+    // One-sided density of white noise: twice variance times step. The median of a mean of exponential variables lies below
+    // their mean (Wilson and Hilferty 1931).
+    let to_mean = (1.0 - 1.0 / (9.0 * samples.len() as f64)).powi(3);
+    let variance = floor / to_mean / (2.0 * first.step_s) / first.response(hz).powi(2);
+    let bins = spectrum.density.len() as f64 / PADDING as f64;
+    let (tone, waves) = fitted(samples, hz, variance.max(f64::MIN_POSITIVE));
+    let within = stylet_stats::MAD_TO_SD * median_of(first.fast_n.iter().map(|x| x.abs()));
+    let noise_sd = within.min(variance.sqrt());
+    let needed = MIN_GAIN_NATS + libm::log(bins.max(1.0));
+    (tone.gain_nats > needed && tone.amplitude_n.0 > MIN_AMPLITUDE_SD * noise_sd).then_some((tone, waves))
+}
+
+/// Bin of the largest ratio of power to the median around it, and this median.
+fn spectral_peak(spectrum: &PowerSpectrum, lowest_hz: f64) -> Option<(usize, f64)> {
+    let power = &spectrum.density;
+    let first = (lowest_hz / spectrum.bin_hz).ceil() as usize;
+    let around = SURROUNDING_RESOLUTIONS * PADDING;
+    let mut best: Option<(usize, f64)> = None;
+    let mut floor = 0.0;
+    for k in first..power.len() {
+        if (k - first).is_multiple_of(around / 4) {
+            let (lo, hi) = (k.saturating_sub(around).max(first.min(k)), (k + around).min(power.len()));
+            floor = median_of(power[lo..hi].iter().copied());
+        }
+        let ratio = power[k] / floor.max(f64::MIN_POSITIVE);
+        if ratio > MIN_POWER_RATIO && best.is_none_or(|(b, f)| ratio > power[b] / f) {
+            best = Some((k, floor));
+        }
+    }
+    best
+}
+
+/// The frequency of largest power within a bin of a peak, by golden section.
+fn refined(samples: &[Samples], hz: f64, bin_hz: f64, highest_hz: f64) -> f64 {
+    /// Golden section.
+    const SHARE: f64 = 0.618_033_988_749_894_9;
+    /// Steps of the golden section: to 1e-5 of a bin.
+    const ITERATIONS: usize = 24;
+    let (mut low, mut high) = (hz - bin_hz, (hz + bin_hz).min(highest_hz));
+    let (mut a, mut b) = (high - SHARE * (high - low), low + SHARE * (high - low));
+    let (mut pa, mut pb) = (power(samples, a), power(samples, b));
+    for _ in 0..ITERATIONS {
+        if pa > pb {
+            (high, b, pb) = (b, a, pa);
+            a = high - SHARE * (high - low);
+            pa = power(samples, a);
+        } else {
+            (low, a, pa) = (a, b, pb);
+            b = low + SHARE * (high - low);
+            pb = power(samples, b);
+        }
+    }
+    0.5 * (low + high)
+}
+
+/// Fit of a tone at a frequency in noise of this variance per sample, and its force in every recording.
+fn fitted(samples: &[Samples], hz: f64, variance: f64) -> (FastTone, Vec<Vec<f64>>) {
+    let mut waves = Vec::with_capacity(samples.len());
+    let (mut window_power, mut stable_power, mut all, mut windows) = (0.0, 0.0, 0.0, 0.0);
+    let (mut information, mut frequency_information, mut mid) = (0.0, 0.0, 0.0);
+    let mut steps: Vec<f64> = Vec::new();
+    let mut phases: Vec<WithSd> = Vec::new();
+    for s in samples {
+        let mut wave = vec![0.0; s.fast_n.len()];
+        let mut before: Option<[f64; 2]> = None;
+        for range in s.windows() {
+            let ([a, b], n) = s.sinusoid(hz, range.clone());
+            window_power += (a * a + b * b) * n;
+            windows += 1.0;
+            if let Some([p, q]) = before.replace([a, b]) {
+                let turned = libm::atan2(b * p - a * q, a * p + b * q);
+                steps.push(turned / (TAU * WINDOW_S));
+            }
+            for k in range {
+                let (sine, cosine) = libm::sincos(TAU * hz * s.time_s[k]);
+                wave[k] = a * sine + b * cosine;
+            }
+        }
+        waves.push(wave);
+        let ([a, b], n) = s.sinusoid(hz, 0..s.fast_n.len());
+        let square = a * a + b * b;
+        (stable_power, all) = (stable_power + square * n, all + n);
+        (information, mid) = (information + n, mid + n * s.mid_s());
+        frequency_information += n * s.duration_s().powi(2);
+        phases.push((libm::atan2(b, a), (2.0 * variance / (square * n).max(f64::MIN_POSITIVE)).sqrt()));
+    }
+    let recordings = samples.len() as f64;
+    let (window_nats, stable_nats) = (0.25 * window_power / variance, 0.25 * stable_power / variance);
+    let count = all.max(2.0) as usize;
+    let penalty = |of: f64| bic_penalty((2.0 * of) as usize + 1, count);
+    let gain_nats = (window_nats - penalty(windows)).max(stable_nats - penalty(recordings));
+    // Two coefficients of noise alone have one nat.
+    let is_stable = stable_nats - recordings > MIN_COHERENCE * (window_nats - windows);
+    let nats = if is_stable { stable_nats - recordings } else { window_nats - windows };
+    let amplitude = (4.0 * variance * nats.max(0.0) / f64::max(all, 1.0)).sqrt();
+    let amplitude_sd = (2.0 * variance / information.max(1.0)).sqrt();
+    let bound =
+        (6.0 * variance / (PI * PI * amplitude * amplitude * frequency_information).max(1e-300)).sqrt();
+    let frequency_sd = if is_stable {
+        bound
+    } else {
+        /// Neighbouring windows that count as one: the frequency drifts slowly.
+        const DEPENDENT_WINDOWS: f64 = 10.0;
+        let scatter = stylet_stats::sd(&steps);
+        bound.max(scatter * (DEPENDENT_WINDOWS / steps.len().max(1) as f64).sqrt())
+    };
+    let relative =
+        (amplitude_sd / amplitude.max(1e-300)).hypot(TAU * mid / information.max(1.0) * frequency_sd);
+    let phase_rad = common_phase(&phases)
+        .filter(|_| is_stable)
+        .map_or_else(|| (phases.first().map_or(0.0, |p| p.0), f64::INFINITY), |phase| (phase, relative));
+    let tone = FastTone {
+        frequency_hz: (hz, frequency_sd),
+        amplitude_n: (amplitude, amplitude_sd),
+        phase_rad,
+        gain_nats,
+    };
+    (tone, waves)
+}
+
+/// The common phase of recordings, if theirs agree.
+fn common_phase(phases: &[WithSd]) -> Option<f64> {
+    let (mut s, mut c) = (0.0, 0.0);
+    for (phase, sd) in phases {
+        let weight = 1.0 / (sd * sd).max(1e-12);
+        let (a, b) = libm::sincos(*phase);
+        (s, c) = (s + weight * a, c + weight * b);
+    }
+    let mean = libm::atan2(s, c);
+    let off = |phase: f64| libm::remainder(phase - mean, TAU).abs();
+    phases.iter().all(|(phase, sd)| off(*phase) < PHASE_AGREEMENT_SD * sd.max(0.02)).then_some(mean)
+}
+
+#[cfg(test)]
+mod tests;
