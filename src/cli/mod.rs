@@ -19,6 +19,8 @@ mod reproduce;
 mod resource_limits;
 mod run;
 mod scorecard;
+#[cfg(feature = "studio")]
+mod studio;
 mod sweep;
 mod terminal_output;
 mod text_plot;
@@ -69,6 +71,8 @@ pub fn main() -> ExitCode {
         Command::Effects(args) => effects::effects(args),
         Command::Benchmark(args) => benchmark::benchmark(args),
         Command::Listen(args) => listen::listen(args),
+        #[cfg(feature = "studio")]
+        Command::Studio(args) => studio::studio(args),
         Command::Reproduce(args) => reproduce::reproduce(args),
     })
     .unwrap_or_else(|_| Err(Failure::internal("the command stopped unexpectedly")));

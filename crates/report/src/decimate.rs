@@ -5,7 +5,8 @@ pub(crate) const MAX_POINTS: usize = 20_000;
 
 /// Indices to keep so that about `max_points` remain of curves that share one abscissa: both ends and, in every bucket, the
 /// smallest and largest value of each curve and one sample of each gap. `None` when the curves are short enough.
-pub(crate) fn kept_indices(columns: &[&[f64]], length: usize, max_points: usize) -> Option<Vec<usize>> {
+#[must_use]
+pub fn kept_indices(columns: &[&[f64]], length: usize, max_points: usize) -> Option<Vec<usize>> {
     if length <= max_points || columns.is_empty() || length == 0 {
         return None;
     }
@@ -44,7 +45,8 @@ fn keep_extremes(column: &[f64], from: usize, to: usize, kept: &mut Vec<usize>) 
 }
 
 /// The values at the kept indices; a column too short for an index gives not-a-number there.
-pub(crate) fn pick(column: &[f64], kept: &[usize]) -> Vec<f64> {
+#[must_use]
+pub fn pick(column: &[f64], kept: &[usize]) -> Vec<f64> {
     kept.iter().map(|&index| column.get(index).copied().unwrap_or(f64::NAN)).collect()
 }
 

@@ -4,11 +4,9 @@ use crate::chart_json;
 use crate::chart_model::Chart;
 use crate::escaping::{escape_html, escape_script_json, percent_encode, slug};
 use crate::page_model::{Block, Cell, Code, Page, Section, Status, SvgImage, Table, Text, Tile};
+use crate::vendored::{UPLOT_CSS, UPLOT_JS, UPLOT_LICENCE};
 use std::fmt::Write;
 
-const UPLOT_JS: &str = include_str!("../assets/uPlot.iife.min.js");
-const UPLOT_CSS: &str = include_str!("../assets/uPlot.min.css");
-const UPLOT_LICENCE: &str = include_str!("../assets/LICENSE-uPlot");
 const PAGE_CSS: &str = include_str!("../assets/page.css");
 /// In load order: each may use the ones before.
 const PAGE_JS: [&str; 4] = [

@@ -5,6 +5,8 @@ mod diagnosis;
 mod inspect;
 mod recordings;
 mod simulation;
+#[cfg(feature = "studio")]
+mod studio;
 mod sweep;
 
 pub use benchmark::{
@@ -15,6 +17,8 @@ pub use diagnosis::{DiagnoseArgs, EffectsArgs, IdentifiabilityArgs, PlanArgs, Pr
 pub use inspect::InspectArgs;
 pub use recordings::{ConvertArgs, EnhanceArgs, ListenArgs};
 pub use simulation::{AlgorithmArg, CompareArgs, ReproduceArgs, RunArgs};
+#[cfg(feature = "studio")]
+pub use studio::StudioArgs;
 pub use sweep::{
     GateArgs, MapArgs, MergeArgs, PlanArgs as SweepPlanArgs, ReplayArgs, RunShardArgs, SweepArgs,
     SweepCommand, SweepSelection,
@@ -66,6 +70,9 @@ pub enum Command {
     Benchmark(BenchmarkArgs),
     /// Run the online algorithm on a live stream: samples by UDP or standard input, results as JSON and on a live page.
     Listen(ListenArgs),
+    /// Open recordings, draw phantoms, diagnose and plan on a local page.
+    #[cfg(feature = "studio")]
+    Studio(StudioArgs),
     /// Reproduce the paper's figures and test its claims, on one page.
     Reproduce(ReproduceArgs),
 }

@@ -1,0 +1,336 @@
+//! Diagnosis, plan and prediction, each in a thread of its own.
+
+use crate::commands;
+use crate::job::Job;
+use crate::messages::*;
+use crate::phantom::{millimetres, segment_text, title};
+use crate::preview::{curves, rms_text};
+use crate::studio::Studio;
+use crate::workspace::{LIMITS, PHANTOM, Workspace};
+use stylet_api::plan_insertion::{self, PlanReport};
+use stylet_api::prediction_files::{self, ModelOrigin};
+use stylet_api::{Diagnosis, DiagnosisInputs, Limits, Scenario, force_along_motion};
+use stylet_report::pages::diagnosis::{recording_differences, summary_sentence};
+use stylet_report::pages::formatting::significant_or_dash;
+use stylet_report::pages::prediction;
+use stylet_report::{percent, significant};
+use stylet_scenario::Motion;
+use stylet_tissue::Effect as _;
+
+const DIAGNOSIS: &str = "diagnosis";
+const PLAN: &str = "plan";
+const PREDICTION: &str = "prediction";
+const EXTENDED: &str = "diagnosis/extended.ron";
+/// Points of the curve of a planned motion.
+const MOTION_POINTS: usize = 400;
+/// Points of the curves without some of the causes.
+const MAX_POINTS: usize = 3000;
+/// Pairs of candidates that are listed.
+const MAX_PAIRS: usize = 8;
+/// Limits of the next insertion before the user changes them; the depth is that of the phantom.
+const LIMITS_AT_FIRST: Limits =
+    Limits { depth_m: 0.0, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0 };
+
+/// A finished diagnosis.
+pub struct Diagnosed {
+    pub view: DiagnosisView,
+    extended: Scenario,
+}
+
+/// A plan.
+pub struct Planned {
+    pub view: PlanView,
+    motion: Motion,
+}
+
+/// What a job gives.
+pub enum JobResult {
+    Diagnosed(Box<Diagnosed>, CommandView),
+    Planned(Box<Planned>, CommandView),
+    Predicted(PredictionView, CommandView),
+}
+
+/// The results in the workspace.
+#[derive(Default)]
+pub struct Explained {
+    pub diagnosis: Option<Diagnosed>,
+    pub plan: Option<Planned>,
+    pub prediction: Option<PredictionView>,
+}
+
+impl Explained {
+    /// The diagnosis that a workspace holds.
+    pub fn read(workspace: &Workspace) -> Self {
+        let read = || {
+            let diagnosis = serde_json::from_str(&workspace.read("diagnosis/diagnosis.json")?).ok()?;
+            let extended = Scenario::parse(EXTENDED, &workspace.read(EXTENDED)?).ok()?;
+            Some(Diagnosed { view: diagnosis_view(&diagnosis), extended })
+        };
+        Self { diagnosis: read(), ..Self::default() }
+    }
+
+    pub fn extended(&self) -> Result<Scenario, Problem> {
+        let missing = || Problem::new("there is no diagnosis yet");
+        let mut scenario = self.diagnosis.as_ref().ok_or_else(missing)?.extended.clone();
+        if scenario.name.trim().is_empty() {
+            scenario.name = "extended".to_owned();
+        }
+        Ok(scenario)
+    }
+
+    pub fn planned_motion(&self) -> Result<Motion, Problem> {
+        self.plan.as_ref().map(|p| p.motion.clone()).ok_or_else(|| Problem::new("there is no plan yet"))
+    }
+}
+
+fn failed(why: impl ToString) -> Problem {
+    Problem::new(why.to_string())
+}
+
+/// Phantom, recordings and map as files, for a job.
+fn inputs(studio: &mut Studio, files: &[String]) -> Result<DiagnosisInputs, Problem> {
+    if studio.job.as_ref().is_some_and(Job::is_running) {
+        return Err(Problem::new("another computation is running; wait for it or cancel it"));
+    }
+    studio.keep()?;
+    Ok(DiagnosisInputs {
+        scenario: studio.workspace.path(PHANTOM),
+        data: files.iter().map(|file| studio.workspace.data(file)).collect::<Result<_, _>>()?,
+        columns: studio.map_file(),
+        repair: false,
+    })
+}
+
+fn begun(studio: &mut Studio, job: Job) -> JobView {
+    let view = job.view();
+    studio.job = Some(job);
+    view
+}
+
+/// Takes the result of a job into the state.
+pub fn collect(studio: &mut Studio, result: JobResult) {
+    let command = match result {
+        JobResult::Diagnosed(diagnosed, command) => {
+            studio.explained = Explained { diagnosis: Some(*diagnosed), ..Explained::default() };
+            command
+        }
+        JobResult::Planned(planned, command) => {
+            studio.explained.plan = Some(*planned);
+            command
+        }
+        JobResult::Predicted(predicted, command) => {
+            studio.explained.prediction = Some(predicted);
+            command
+        }
+    };
+    // The results are complete; a journal that cannot be written fails the next change, too.
+    let _ = studio.workspace.record(command);
+}
+
+pub fn start_diagnosis(studio: &mut Studio, request: FilesRequest) -> Result<JobView, Problem> {
+    if request.files.is_empty() {
+        return Err(Problem::new("choose at least one recording"));
+    }
+    let inputs = inputs(studio, &request.files)?;
+    let folder = studio.workspace.path(DIAGNOSIS);
+    let job = Job::start("diagnose", move |stage| {
+        stage("reading the recordings");
+        let assumed = Scenario::load(&inputs.scenario).map_err(failed)?;
+        let recordings = inputs.read_recordings().map_err(failed)?;
+        let found = stylet_api::diagnose(&assumed, &recordings, stage).map_err(failed)?;
+        let output = found.output(&assumed, &inputs).map_err(failed)?;
+        stage("writing the results");
+        output.write(&folder).map_err(failed)?;
+        let command = commands::diagnose(&inputs, &folder, &output);
+        let view = diagnosis_view(&found.diagnosis);
+        Ok(JobResult::Diagnosed(Box::new(Diagnosed { view, extended: found.extended }), command))
+    })?;
+    Ok(begun(studio, job))
+}
+
+fn diagnosis_view(d: &Diagnosis) -> DiagnosisView {
+    let number = |x: f64| significant(x, 4);
+    let interval = |low: f64, high: f64| format!("{} to {}", number(low), number(high));
+    let causes = d.causes.iter().map(|c| {
+        let mut lines = vec![format!("confidence {}", significant(c.confidence, 3))];
+        lines.extend(c.parameters.iter().map(|(path, e)| {
+            format!("{path} = {} (95 %: {})", number(e.value), interval(e.low, e.high))
+        }));
+        if !c.equivalent.is_empty() {
+            lines.push(format!("equivalent: {}", c.equivalent.join(", ")));
+        }
+        CauseView { id: c.effect.clone(), title: title(&c.effect), lines }
+    });
+    let rows = d.base_parameters.iter().map(|p| {
+        let whose = if p.layer == 0 { "tissue".to_owned() } else { format!("layer {}", p.layer) };
+        let remark = match (p.at_bound, p.changed) {
+            (true, _) => "at its bound",
+            (_, true) => "changed",
+            _ => "",
+        };
+        vec![whose, p.name.clone(), number(p.assumed), number(p.value), interval(p.low, p.high), remark.to_owned()]
+    });
+    let g = &d.gain;
+    let what = if g.held_out { "on held-out recordings" } else { "on the one recording, which was fitted" };
+    let notes = d.data_quality.iter().map(|q| format!("{}: {}", q.recording, q.note.message));
+    DiagnosisView {
+        sentence: summary_sentence(d),
+        verdict: format!("{:?}", d.verdict).to_lowercase(),
+        files: g.recordings.clone(),
+        causes: causes.collect(),
+        gain: format!(
+            "Residual {what}: {} N before, {} N after; noise {} N.",
+            significant(g.rmse_before_n, 3),
+            significant(g.rmse_after_n, 3),
+            significant(g.floor_n, 3)
+        ),
+        parameters: TableView {
+            head: ["", "parameter", "assumed", "fitted", "95 %", ""].map(str::to_owned).to_vec(),
+            rows: rows.collect(),
+        },
+        notes: recording_differences(d).into_iter().chain(d.advice.iter().cloned()).chain(notes).collect(),
+        not_identifiable: d.not_identifiable.iter().map(|id| title(id)).collect(),
+        folder: DIAGNOSIS.to_owned(),
+    }
+}
+
+/// The limits of the workspace, or those at first.
+pub fn limits(studio: &Studio) -> LimitsView {
+    let kept = studio.workspace.read(LIMITS).and_then(|text| stylet_scenario::parse(LIMITS, &text).ok());
+    let depth_m = studio.now.phantom.tissue.end_m();
+    let l: Limits = kept.unwrap_or(Limits { depth_m, ..LIMITS_AT_FIRST });
+    LimitsView {
+        depth_mm: millimetres(l.depth_m),
+        speed_mm_per_s: millimetres(l.speed_mps),
+        acceleration_mm_per_s2: millimetres(l.acceleration_mps2),
+        duration_s: l.duration_s,
+        force_n: l.force_n,
+    }
+}
+
+pub fn start_plan(studio: &mut Studio, request: PlanRequest) -> Result<JobView, Problem> {
+    let l = &request.limits;
+    let limits = Limits {
+        depth_m: 1e-3 * l.depth_mm,
+        speed_mps: 1e-3 * l.speed_mm_per_s,
+        acceleration_mps2: 1e-3 * l.acceleration_mm_per_s2,
+        duration_s: l.duration_s,
+        force_n: l.force_n,
+    };
+    limits.check().map_err(failed)?;
+    let inputs = inputs(studio, &request.files)?;
+    let ron = stylet_scenario::ron_options().to_string(&limits).map_err(failed)?;
+    studio.workspace.write(LIMITS, format!("Limits{ron}\n").as_bytes())?;
+    let limits_file = studio.workspace.path(LIMITS);
+    let motion_file = studio.workspace.path("plan/plan.ron");
+    let job = Job::start("plan", move |stage| {
+        let limits = plan_insertion::load_limits(&limits_file).map_err(failed)?;
+        let report = plan_insertion::plan(&inputs, (&limits_file, &limits), false, stage).map_err(failed)?;
+        stage("writing the plan");
+        report.write(&motion_file).map_err(failed)?;
+        let planned = Planned { view: plan_view(&report), motion: report.plan.motion.clone() };
+        Ok(JobResult::Planned(Box::new(planned), commands::plan(&inputs, &limits_file, &motion_file)))
+    })?;
+    Ok(begun(studio, job))
+}
+
+fn plan_view(report: &PlanReport) -> PlanView {
+    let plan = &report.plan;
+    let mut pairs: Vec<_> = plan.pairs.iter().filter(|p| p.distinguishable).collect();
+    pairs.sort_by(|a, b| a.nats_after.total_cmp(&b.nats_after));
+    let motion = plan.motion.plan();
+    let at = |k: usize| plan.duration_s * k as f64 / MOTION_POINTS as f64;
+    let decided = match pairs.is_empty() {
+        true => "no remaining pair of candidates can be told apart within these limits".to_owned(),
+        false => format!(
+            "the next diagnosis names the right cause with probability {}, now {}",
+            percent(plan.probability_decided),
+            percent(plan.probability_now)
+        ),
+    };
+    PlanView {
+        summary: format!(
+            "{} s, to {} mm, at most {} N expected: {decided}.",
+            significant(plan.duration_s, 3),
+            significant(1e3 * plan.depth_m, 3),
+            significant(plan.force_n, 3)
+        ),
+        segments: match &plan.motion {
+            Motion::Program { segments, .. } => segments.iter().map(segment_text).collect(),
+            _ => Vec::new(),
+        },
+        pairs: pairs
+            .iter()
+            .take(MAX_PAIRS)
+            .map(|p| vec![title(&p.a), title(&p.b), significant(p.nats_before, 2), significant(p.nats_after, 3)])
+            .collect(),
+        time_s: (0..=MOTION_POINTS).map(at).collect(),
+        depth_mm: (0..=MOTION_POINTS)
+            .map(|k| motion.as_ref().map_or(f32::NAN, |m| (1e3 * m.at(at(k)).position_m) as f32))
+            .collect(),
+        folder: PLAN.to_owned(),
+    }
+}
+
+pub fn start_prediction(studio: &mut Studio, request: FilesRequest) -> Result<JobView, Problem> {
+    if request.files.is_empty() {
+        return Err(Problem::new("choose the recording of the next insertion"));
+    }
+    let inputs = inputs(studio, &request.files)?;
+    let model = match &studio.explained.diagnosis {
+        Some(_) => studio.workspace.path(EXTENDED),
+        None => inputs.scenario.clone(),
+    };
+    let folder = studio.workspace.path(PREDICTION);
+    let job = Job::start("predict", move |stage| {
+        stage("reading the recordings");
+        let scenario = Scenario::load(&model).map_err(failed)?;
+        let ModelOrigin { diagnosis, assumed } = ModelOrigin::of_model_file(&model, None).map_err(failed)?;
+        let recordings = inputs.read_recordings().map_err(failed)?;
+        stage("predicting");
+        let (diagnosis, assumed) = (diagnosis.as_ref(), assumed.as_ref());
+        let found = stylet_api::predict_recordings(&scenario, diagnosis, assumed, &[], &recordings).map_err(failed)?;
+        let output = prediction_files::output_files(&scenario, &model, &found).map_err(failed)?;
+        stage("writing the results");
+        output.write(&folder).map_err(failed)?;
+        let p = &found.prediction;
+        let rows = p.recordings.iter().map(|r| {
+            let assumed = significant_or_dash(r.assumed_rmse_n, 1.0, 3);
+            vec![r.name.clone(), significant(r.rmse_n, 3), assumed, percent(r.band_coverage)]
+        });
+        let view = PredictionView {
+            sentence: prediction::summary_sentence(p),
+            rows: rows.collect(),
+            folder: PREDICTION.to_owned(),
+        };
+        Ok(JobResult::Predicted(view, commands::predict(&model, &inputs, &folder, &output)))
+    })?;
+    Ok(begun(studio, job))
+}
+
+/// Measured force, that of the phantom, and that of the diagnosed model with some of its causes.
+pub fn without_causes(studio: &mut Studio, request: CausesRequest) -> Result<CausesView, Problem> {
+    let loaded = studio.recording(&request.file)?;
+    let mut model = studio.explained.extended()?;
+    let found: Vec<&str> = studio.explained.diagnosis.iter().flat_map(|d| &d.view.causes).map(|c| c.id.as_str()).collect();
+    model.effects.retain(|e| {
+        let id = e.info().id;
+        !found.contains(&id) || request.causes.iter().any(|on| on == id)
+    });
+    let assumed_n = force_along_motion(&studio.now.phantom, &loaded.recording).map_err(failed)?;
+    let model_n = force_along_motion(&model, &loaded.recording).map_err(failed)?;
+    let measured_n = &loaded.recording.force_n;
+    let forces = [
+        ("measured", "measured", measured_n.as_slice()),
+        ("assumed", "phantom", &assumed_n),
+        ("extended", "diagnosed model", &model_n),
+    ];
+    Ok(CausesView {
+        summary: format!(
+            "Error of the phantom {}, of the diagnosed model with the causes switched on {}.",
+            rms_text(measured_n, &assumed_n),
+            rms_text(measured_n, &model_n)
+        ),
+        curves: curves(&loaded.recording, &forces, MAX_POINTS),
+    })
+}

@@ -1,0 +1,20 @@
+#![doc = include_str!("../README.md")]
+#![forbid(unsafe_code)]
+
+mod commands;
+mod explain;
+mod job;
+mod look;
+mod messages;
+mod open;
+mod page;
+mod phantom;
+mod preview;
+mod server;
+mod sliders;
+mod studio;
+mod workspace;
+
+pub use messages::Problem;
+pub use server::Server;
+pub use studio::Studio;

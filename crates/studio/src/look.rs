@@ -1,0 +1,200 @@
+//! The online algorithm on a recording.
+
+use crate::commands;
+use crate::messages::*;
+use crate::phantom::millimetres;
+use crate::preview::curves;
+use crate::studio::Studio;
+use std::sync::Arc;
+use stylet_api::enhancement::{ResultSource, enhance_recording};
+use stylet_api::{AlgorithmRun, EnhancerConfigFile, Recording, enhance};
+use stylet_core::LayerEstimate;
+use stylet_core::config::Algorithm;
+use stylet_record::QualityNote;
+use stylet_report::{plus_minus, significant};
+
+/// Points of a curve.
+const MAX_POINTS: usize = 6000;
+/// Ruptures and layers that are listed.
+const MAX_LISTED: usize = 60;
+
+/// The online algorithms, the default first.
+pub const ALGORITHMS: [(&str, Algorithm); 2] = [("Stylet", Algorithm::Stylet), ("Paper", Algorithm::Paper)];
+
+fn config(algorithm: &str) -> Result<EnhancerConfigFile, Problem> {
+    let (_, chosen) = ALGORITHMS
+        .iter()
+        .find(|(name, _)| *name == algorithm)
+        .ok_or_else(|| Problem::new(format!("there is no algorithm {algorithm:?}")))?;
+    let mut config = EnhancerConfigFile::default();
+    config.enhance.algorithm = *chosen;
+    Ok(config)
+}
+
+/// The outputs of an algorithm for a recording; those of the recording shown last are kept.
+pub fn run_algorithm(studio: &mut Studio, file: &str, algorithm: &str) -> Result<Arc<AlgorithmRun>, Problem> {
+    let known = studio.enhanced.iter().find(|(f, a, _)| f == file && a == algorithm);
+    if let Some((_, _, run)) = known {
+        return Ok(run.clone());
+    }
+    let loaded = studio.recording(file)?;
+    let run = Arc::new(enhance(&loaded.recording, &config(algorithm)?));
+    studio.enhanced.retain(|(f, _, _)| f == file);
+    studio.enhanced.push((file.to_owned(), algorithm.to_owned(), run.clone()));
+    Ok(run)
+}
+
+pub fn findings(notes: &[QualityNote]) -> Vec<FindingView> {
+    let finding = |n: &QualityNote| FindingView {
+        level: if n.blocking { "bad" } else { "warn" },
+        message: n.message.clone(),
+    };
+    notes.iter().map(finding).collect()
+}
+
+pub fn size_text(recording: &Recording) -> String {
+    format!(
+        "{} samples over {} s at {} Hz",
+        recording.len(),
+        significant(recording.duration_s(), 4),
+        significant(recording.sample_hz(), 4)
+    )
+}
+
+/// Samples of a window, with all columns.
+fn window(recording: &Recording, window_s: Option<[f64; 2]>) -> std::ops::Range<usize> {
+    let Some([from, to]) = window_s else { return 0..recording.len() };
+    let first = recording.time_s.partition_point(|t| *t < from).saturating_sub(1);
+    let last = recording.time_s.partition_point(|t| *t <= to) + 1;
+    first..last.min(recording.len()).max(first)
+}
+
+pub fn look(studio: &mut Studio, request: LookRequest) -> Result<LookView, Problem> {
+    let loaded = studio.recording(&request.file)?;
+    let recording = &loaded.recording;
+    let mut runs = Vec::new();
+    for algorithm in request.algorithms.iter().take(ALGORITHMS.len()) {
+        runs.push((algorithm.as_str(), run_algorithm(studio, &request.file, algorithm)?));
+    }
+    let shown = window(recording, request.window_s);
+    let part = |column: &[f64]| column.get(shown.clone()).unwrap_or_default().to_vec();
+    let visible = Recording {
+        time_s: part(&recording.time_s),
+        position_m: part(&recording.position_m),
+        velocity_mps: part(&recording.velocity_mps),
+        ..Recording::default()
+    };
+    let mut columns: Vec<(&'static str, &str, Vec<f64>)> =
+        vec![("measured", "measured", part(&recording.force_n))];
+    for (algorithm, run) in &runs {
+        columns.push(("enhanced", algorithm, part(&run.trace.enhanced_n)));
+        if run.trace.low_n.iter().any(|v| v.is_finite()) {
+            columns.push(("low", algorithm, part(&run.trace.low_n)));
+            columns.push(("high", algorithm, part(&run.trace.high_n)));
+        }
+    }
+    let forces: Vec<(&'static str, &str, &[f64])> =
+        columns.iter().map(|(role, name, column)| (*role, *name, column.as_slice())).collect();
+    let drawn = curves(&visible, &forces, MAX_POINTS);
+    Ok(LookView {
+        summary: size_text(recording),
+        findings: findings(&loaded.notes),
+        samples: [visible.time_s.len(), drawn.time_s.len()],
+        curves: drawn,
+        runs: runs.iter().map(|(algorithm, run)| run_view(algorithm, run, recording)).collect(),
+        file: request.file,
+    })
+}
+
+fn run_view(algorithm: &str, run: &AlgorithmRun, recording: &Recording) -> RunView {
+    let trace = &run.trace;
+    let contact = trace.contact_m.zip(trace.contact_s).map(|(z, time_s)| EventView {
+        time_s,
+        depth_mm: millimetres(z),
+        label: "contact".to_owned(),
+    });
+    let ruptures: Vec<EventView> = trace
+        .detections
+        .iter()
+        .take(MAX_LISTED)
+        .map(|d| EventView {
+            time_s: d.located_s,
+            depth_mm: millimetres(d.located_m),
+            label: format!("rupture {} by {}", d.layer, d.cause.name()),
+        })
+        .collect();
+    let mut layers = Vec::new();
+    let mut front = contact.clone();
+    for (k, rupture) in ruptures.iter().enumerate() {
+        if let Some(front) = &front {
+            layers.push(span(format!("layer {}", k + 1), front, (rupture.depth_mm, rupture.time_s)));
+        }
+        front = Some(rupture.clone());
+    }
+    let deepest = recording.samples().max_by(|a, b| a.position_m.total_cmp(&b.position_m));
+    if let (Some(front), Some(end)) = (&front, deepest) {
+        layers.push(span(format!("layer {}", layers.len() + 1), front, (millimetres(end.position_m), end.time_s)));
+    }
+    RunView {
+        algorithm: algorithm.to_owned(),
+        contact_text: match &contact {
+            Some(c) => {
+                format!("contact at {} mm, {} s", significant(c.depth_mm, 4), significant(c.time_s, 4))
+            }
+            None => "no contact detected: the force never exceeds its noise in air".to_owned(),
+        },
+        contact,
+        ruptures,
+        layers,
+        table: TableView {
+            head: ["layer", "from mm", "thick mm", "K N/m", "b N s/m²", "drop N"].map(str::to_owned).to_vec(),
+            rows: trace.estimates.iter().take(MAX_LISTED).map(layer_row).collect(),
+        },
+    }
+}
+
+fn span(label: String, front: &EventView, back: (f64, f64)) -> LayerSpan {
+    LayerSpan { label, depth_mm: [front.depth_mm, back.0], time_s: [front.time_s, back.1] }
+}
+
+fn layer_row(e: &LayerEstimate) -> Vec<String> {
+    let interval = |value: f64, sd: f64| plus_minus(value, (sd > 0.0).then_some(stylet_stats::Z95 * sd), 3);
+    vec![
+        e.layer.to_string(),
+        significant(1e3 * e.start_m, 3),
+        significant(1e3 * e.thickness_m, 3),
+        interval(e.stiffness_n_per_m, e.stiffness_sd),
+        interval(e.friction, e.friction_sd),
+        interval(e.drop_n, e.drop_sd_n),
+    ]
+}
+
+/// `stylet enhance` of a recording.
+pub fn write_enhancement(studio: &mut Studio, request: LookRequest) -> Result<RunResultView, Problem> {
+    let algorithm = request.algorithms.first().map_or(ALGORITHMS[0].0, String::as_str);
+    let config = config(algorithm)?;
+    studio.keep()?;
+    let workspace = &studio.workspace;
+    let data = workspace.data(&request.file)?;
+    let map = studio.map_file();
+    let config_file = (algorithm != ALGORITHMS[0].0).then(|| format!("enhance-{}.ron", algorithm.to_lowercase()));
+    if let Some(name) = &config_file {
+        workspace.write(name, format!("Enhance(algorithm: {algorithm})\n").as_bytes())?;
+    }
+    let config_path = config_file.map(|name| workspace.path(&name));
+    let failed = |why: stylet_api::Error| Problem::new(why.to_string());
+    // As the command reads it.
+    let (recording, notes) = stylet_record::read_csv(&data, &studio.read_options())
+        .map_err(|why| Problem::new(why.to_string()))?;
+    let folder_name = format!("enhanced-{}", request.file.rsplit_once('.').map_or(&*request.file, |(stem, _)| stem));
+    let folder = studio.workspace.path(&folder_name);
+    let regressor = config.enhance.model;
+    let result = enhance_recording(recording, notes, config, &[regressor], None).map_err(failed)?;
+    let mut command = commands::enhance(&data, map.as_deref(), config_path.as_deref(), &folder, &Default::default());
+    let source = ResultSource { data: &data, config: config_path.as_deref(), command: command.shell.clone() };
+    let output = result.output_files(&source).map_err(failed)?;
+    output.write(&folder).map_err(failed)?;
+    command.files = commands::written(&folder, &output);
+    studio.workspace.record(command)?;
+    Ok(RunResultView { summary: format!("written to {}", folder.display()), folder: folder_name })
+}

@@ -1,0 +1,443 @@
+//! Messages between the page and the studio: plain data, JSON on the wire. Everything is ready for display: depths are in mm, numbers that
+//! are printed come as text, sliders as positions. The page computes nothing.
+
+use serde::{Deserialize, Serialize};
+
+/// A request that cannot be fulfilled: reason and remedy.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Problem {
+    /// The message.
+    pub error: String,
+}
+
+impl Problem {
+    /// A problem with this message.
+    pub fn new(error: impl Into<String>) -> Self {
+        Self { error: error.into() }
+    }
+}
+
+/// Everything that the page shows besides curves.
+#[derive(Debug, Serialize)]
+pub struct StateView {
+    pub version: &'static str,
+    pub folder: String,
+    pub files: Vec<String>,
+    pub map: Option<String>,
+    pub phantom: PhantomView,
+    pub commands: Vec<CommandView>,
+    pub undo: usize,
+    pub redo: usize,
+    pub job: Option<JobView>,
+    pub diagnosis: Option<DiagnosisView>,
+    pub plan: Option<PlanView>,
+    pub prediction: Option<PredictionView>,
+    pub limits: LimitsView,
+}
+
+/// Lists that never change.
+#[derive(Debug, Serialize)]
+pub struct LibraryView {
+    pub scenarios: Vec<&'static str>,
+    pub algorithms: Vec<&'static str>,
+    pub motions: Vec<(&'static str, &'static str)>,
+    pub effects: Vec<EffectEntry>,
+}
+
+/// An effect of the gallery.
+#[derive(Debug, Serialize)]
+pub struct EffectEntry {
+    pub id: &'static str,
+    pub title: String,
+    pub equation: &'static str,
+    pub signature: &'static str,
+}
+
+/// A command that repeats what the page did.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CommandView {
+    pub shell: String,
+    pub python: String,
+    pub files: Vec<String>,
+}
+
+/// A number that a slider changes.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SliderView {
+    pub field: String,
+    pub label: String,
+    pub unit: &'static str,
+    pub help: String,
+    pub position: usize,
+    pub positions: usize,
+    pub text: String,
+}
+
+/// A phantom.
+#[derive(Debug, Serialize)]
+pub struct PhantomView {
+    pub name: String,
+    pub faces_mm: Vec<f64>,
+    pub layers: Vec<LayerView>,
+    pub effects: Vec<EffectView>,
+    pub tolerances: Vec<SliderView>,
+    pub motion: String,
+    pub ron: String,
+}
+
+/// A layer of a phantom.
+#[derive(Debug, Serialize)]
+pub struct LayerView {
+    pub name: String,
+    pub sliders: Vec<SliderView>,
+}
+
+/// An effect of a phantom.
+#[derive(Debug, Serialize)]
+pub struct EffectView {
+    pub id: &'static str,
+    pub title: String,
+    pub sliders: Vec<SliderView>,
+}
+
+/// A change of the phantom.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum Edit {
+    Face {
+        /// 0 is the surface.
+        face: usize,
+        depth_mm: f64,
+    },
+    Layer {
+        layer: usize,
+        field: String,
+        to: Target,
+    },
+    LayerName {
+        layer: usize,
+        name: String,
+    },
+    SplitLayer {
+        layer: usize,
+    },
+    RemoveLayer {
+        layer: usize,
+    },
+    AddEffect {
+        id: String,
+    },
+    Effect {
+        effect: usize,
+        field: String,
+        to: Target,
+    },
+    RemoveEffect {
+        effect: usize,
+    },
+    Tolerance {
+        field: String,
+        to: Target,
+    },
+    Name {
+        name: String,
+    },
+    Motion {
+        name: String,
+    },
+    Scenario {
+        name: String,
+    },
+    FromRecording {
+        file: String,
+        algorithm: String,
+    },
+    FromDiagnosis,
+    FromPlan,
+    Ron {
+        text: String,
+    },
+}
+
+/// New value of a number.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Target {
+    Position(usize),
+    /// A number as text; empty: none.
+    Text(String),
+}
+
+/// Request for an edit.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EditRequest {
+    pub edit: Edit,
+    /// Recording along which the force is predicted; without one the phantom's own motion.
+    #[serde(default)]
+    pub along: Option<String>,
+    /// Movement of the mouse that the edit belongs to: one step of undo.
+    #[serde(default)]
+    pub stroke: Option<u64>,
+    /// Whether the movement goes on, so that nothing needs to be written yet.
+    #[serde(default)]
+    pub transient: bool,
+}
+
+/// Request that names a recording, or none.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FileRequest {
+    #[serde(default)]
+    pub file: Option<String>,
+}
+
+/// Columns of numbers for drawing; a missing value is null.
+#[derive(Debug, Default, Serialize)]
+pub struct Curves {
+    pub time_s: Vec<f64>,
+    pub depth_mm: Vec<f32>,
+    pub velocity_mm_per_s: Vec<f32>,
+    pub forces: Vec<ForceCurve>,
+}
+
+/// A force over the samples.
+#[derive(Debug, Serialize)]
+pub struct ForceCurve {
+    /// Role: `measured`, `predicted`, `tip`, `enhanced`, `low`, `high`, `assumed`, `extended`.
+    pub role: &'static str,
+    pub name: String,
+    pub force_n: Vec<f32>,
+}
+
+/// A rupture or contact.
+#[derive(Clone, Debug, Serialize)]
+pub struct EventView {
+    pub time_s: f64,
+    pub depth_mm: f64,
+    pub label: String,
+}
+
+/// The predicted force of the phantom.
+#[derive(Debug, Serialize)]
+pub struct PreviewView {
+    pub curves: Curves,
+    pub ruptures: Vec<EventView>,
+    pub summary: String,
+}
+
+/// Answer to an edit.
+#[derive(Debug, Serialize)]
+pub struct EditView {
+    pub phantom: PhantomView,
+    pub preview: PreviewView,
+    pub undo: usize,
+    pub redo: usize,
+}
+
+/// Request for the online algorithm on a recording.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LookRequest {
+    pub file: String,
+    pub algorithms: Vec<String>,
+    /// Visible part of the recording in s.
+    #[serde(default)]
+    pub window_s: Option<[f64; 2]>,
+}
+
+/// A recording with the outputs of the online algorithm.
+#[derive(Debug, Serialize)]
+pub struct LookView {
+    pub file: String,
+    pub summary: String,
+    pub findings: Vec<FindingView>,
+    pub curves: Curves,
+    /// Samples in the window, and those sent.
+    pub samples: [usize; 2],
+    pub runs: Vec<RunView>,
+}
+
+/// Outputs of an algorithm.
+#[derive(Debug, Serialize)]
+pub struct RunView {
+    pub algorithm: String,
+    pub contact: Option<EventView>,
+    pub contact_text: String,
+    pub ruptures: Vec<EventView>,
+    /// Layers: front and back in mm and s, label.
+    pub layers: Vec<LayerSpan>,
+    pub table: TableView,
+}
+
+/// A layer as found.
+#[derive(Debug, Serialize)]
+pub struct LayerSpan {
+    pub label: String,
+    pub depth_mm: [f64; 2],
+    pub time_s: [f64; 2],
+}
+
+/// A table of texts.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct TableView {
+    pub head: Vec<String>,
+    pub rows: Vec<Vec<String>>,
+}
+
+/// A finding about a recording.
+#[derive(Clone, Debug, Serialize)]
+pub struct FindingView {
+    /// `bad` (a diagnosis is refused), `warn` or `good`.
+    pub level: &'static str,
+    pub message: String,
+}
+
+/// What was found in a file.
+#[derive(Debug, Serialize)]
+pub struct InspectionView {
+    pub file: String,
+    pub summary: String,
+    pub columns: Vec<ColumnView>,
+    pub findings: Vec<FindingView>,
+    pub readable: bool,
+    pub map: String,
+    /// Quantities that a column can have, with the units of each.
+    pub quantities: Vec<QuantityView>,
+}
+
+/// A quantity.
+#[derive(Debug, Serialize)]
+pub struct QuantityView {
+    pub name: &'static str,
+    pub units: Vec<&'static str>,
+    pub required: bool,
+}
+
+/// A column of a file.
+#[derive(Debug, Serialize)]
+pub struct ColumnView {
+    pub name: String,
+    /// Quantity; empty when the column is not used.
+    pub quantity: &'static str,
+    pub unit: String,
+    pub flipped: bool,
+    pub reason: String,
+    pub range: String,
+    pub sketch: Vec<f32>,
+}
+
+/// A correction of a column.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ColumnRequest {
+    pub file: String,
+    pub column: String,
+    /// Quantity; empty: not used.
+    pub quantity: String,
+    #[serde(default)]
+    pub unit: String,
+    #[serde(default)]
+    pub flipped: bool,
+}
+
+/// Request for a diagnosis or a prediction.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FilesRequest {
+    pub files: Vec<String>,
+}
+
+/// Limits of the next insertion.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LimitsView {
+    pub depth_mm: f64,
+    pub speed_mm_per_s: f64,
+    pub acceleration_mm_per_s2: f64,
+    pub duration_s: f64,
+    pub force_n: f64,
+}
+
+/// Request for a plan after these recordings.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlanRequest {
+    pub files: Vec<String>,
+    pub limits: LimitsView,
+}
+
+/// Work in a thread.
+#[derive(Clone, Debug, Serialize)]
+pub struct JobView {
+    pub kind: &'static str,
+    /// `running`, `done`, `failed` or `cancelled`.
+    pub state: &'static str,
+    pub stages: Vec<String>,
+    pub elapsed_s: f64,
+    pub error: String,
+}
+
+/// A diagnosis.
+#[derive(Clone, Debug, Serialize)]
+pub struct DiagnosisView {
+    pub sentence: String,
+    pub verdict: String,
+    pub files: Vec<String>,
+    pub causes: Vec<CauseView>,
+    pub gain: String,
+    pub parameters: TableView,
+    pub notes: Vec<String>,
+    pub not_identifiable: Vec<String>,
+    pub folder: String,
+}
+
+
+/// An identified effect.
+#[derive(Clone, Debug, Serialize)]
+pub struct CauseView {
+    pub id: String,
+    pub title: String,
+    pub lines: Vec<String>,
+}
+
+/// Request for the force without some of the causes.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CausesRequest {
+    pub file: String,
+    pub causes: Vec<String>,
+}
+
+/// Measured, assumed and extended force.
+#[derive(Debug, Serialize)]
+pub struct CausesView {
+    pub curves: Curves,
+    pub summary: String,
+}
+
+/// A planned insertion.
+#[derive(Clone, Debug, Serialize)]
+pub struct PlanView {
+    pub summary: String,
+    pub segments: Vec<String>,
+    pub pairs: Vec<Vec<String>>,
+    pub time_s: Vec<f64>,
+    pub depth_mm: Vec<f32>,
+    pub folder: String,
+}
+
+/// A prediction.
+#[derive(Clone, Debug, Serialize)]
+pub struct PredictionView {
+    pub sentence: String,
+    pub rows: Vec<Vec<String>>,
+    pub folder: String,
+}
+
+/// Result of a command that ran at once.
+#[derive(Debug, Serialize)]
+pub struct RunResultView {
+    pub summary: String,
+    pub folder: String,
+}

@@ -1,0 +1,388 @@
+//! The phantom: a scenario that is edited with the mouse.
+
+use crate::messages::*;
+use crate::sliders::{Scale, rounded};
+use crate::studio::Studio;
+use crate::workspace::PHANTOM;
+use crate::{commands, look};
+pub use crate::preview::preview;
+use stylet_scenario::{Motion, Scenario, Segment};
+use stylet_tissue::{AnyEffect, Effect as _, EffectInfo, Layer, effect_info, general_effects, per_layer_effects};
+
+/// Thinnest layer that a dragged face leaves, in m.
+const MIN_THICKNESS_M: f64 = 5e-4;
+/// Distance from the surface at which the library's motions begin, in m.
+const APPROACH_M: f64 = 5e-3;
+/// Speed of the library's motions, in m/s.
+const SPEED_MPS: f64 = 2.5e-3;
+/// Depth below the last layer's start that is added to layers found in a recording, relative to the layer, and at least in m.
+const BEYOND: (f64, f64) = (0.2, 5e-3);
+
+macro_rules! shipped {
+    ($($name:literal),* $(,)?) => {
+        [$(($name, include_str!(concat!("../scenarios/", $name, ".ron")))),*]
+    };
+}
+
+/// The shipped scenarios; the first is the phantom of an empty workspace.
+const SCENARIOS: [(&str, &str); 13] = shipped![
+    "three_layers",
+    "three_layer_latex_constant",
+    "three_layer_latex_sinusoidal",
+    "isinglass_25_constant",
+    "isinglass_25_sinusoidal",
+    "isinglass_50_constant",
+    "isinglass_50_sinusoidal",
+    "isinglass_70_constant",
+    "isinglass_70_sinusoidal",
+    "bovine_liver_constant",
+    "bovine_liver_constant_virtual",
+    "abdomen_sinusoidal",
+    "abdomen_sinusoidal_virtual",
+];
+
+const MOTIONS: [(&str, &str); 3] = [
+    ("constant", "one constant speed"),
+    ("sinusoidal", "in and out, sinusoidal"),
+    ("varied", "advance, hold, varying speed, retraction: shows most effects"),
+];
+
+pub fn parse(file: &str, text: &str) -> Result<Scenario, Problem> {
+    Scenario::parse(file, text).map_err(|why| Problem::new(why.to_string()))
+}
+
+/// The phantom of an empty workspace.
+pub fn first() -> Result<Scenario, Problem> {
+    parse(SCENARIOS[0].0, SCENARIOS[0].1)
+}
+
+pub fn ron(scenario: &Scenario) -> Result<String, Problem> {
+    scenario.to_ron().map_err(|why| Problem::new(format!("internal error: {why}; please report it")))
+}
+
+pub fn title(id: &str) -> String {
+    id.replace('_', " ")
+}
+
+pub fn library() -> LibraryView {
+    let entry = |e: &'static EffectInfo| EffectEntry {
+        id: e.id,
+        title: title(e.id),
+        equation: e.equation,
+        signature: e.signature,
+    };
+    LibraryView {
+        scenarios: SCENARIOS.iter().map(|(name, _)| *name).collect(),
+        algorithms: look::ALGORITHMS.iter().map(|(name, _)| *name).collect(),
+        motions: MOTIONS.to_vec(),
+        effects: general_effects().chain(per_layer_effects()).map(entry).collect(),
+    }
+}
+
+const LAYER_FIELDS: [(&str, &str); 4] = [
+    ("thickness", ""),
+    ("stiffness", "elastic force per depth inside the layer"),
+    ("friction", "viscous friction per length of needle inside"),
+    ("puncture", "elastic force at which the layer ruptures; without one it ruptures at its far face"),
+];
+const TOLERANCES: [&str; 3] = ["tolerance", "thickness_tolerance", "surface_tolerance_m"];
+
+fn layer_value(layer: &Layer, field: &str) -> Option<f64> {
+    match field {
+        "thickness" => Some(layer.thickness_m),
+        "stiffness" => Some(layer.stiffness_n_per_m),
+        "friction" => Some(layer.friction_ns_per_m2),
+        _ => layer.puncture_n,
+    }
+}
+
+fn tolerance<'a>(scenario: &'a mut Scenario, field: &str) -> Option<&'a mut f64> {
+    Some(match field {
+        "tolerance" => &mut scenario.tolerance,
+        "thickness_tolerance" => &mut scenario.thickness_tolerance,
+        "surface_tolerance_m" => &mut scenario.surface_tolerance_m,
+        _ => return None,
+    })
+}
+
+pub fn view(scenario: &Scenario) -> Result<PhantomView, Problem> {
+    let tissue = &scenario.tissue;
+    let layer = |layer: &Layer| LayerView {
+        name: layer.name.clone(),
+        sliders: LAYER_FIELDS
+            .iter()
+            .filter_map(|(field, help)| {
+                let value = layer_value(layer, field);
+                Some(Scale::of_layer(field)?.view(field, "", (*help).to_owned(), value))
+            })
+            .collect(),
+    };
+    let effect = |effect: &AnyEffect| EffectView {
+        id: effect.info().id,
+        title: title(effect.info().id),
+        sliders: effect
+            .info()
+            .parameters
+            .iter()
+            .zip(effect.parameters())
+            .map(|(info, value)| {
+                Scale::of_parameter(info).view(info.path, info.path, info.meaning.to_owned(), Some(value))
+            })
+            .collect(),
+    };
+    let mut copy = scenario.clone();
+    let mut tolerance_view = |field: &&str| {
+        let value = *tolerance(&mut copy, field)?;
+        Some(Scale::of_tolerance(field)?.view(field, "", String::new(), Some(value)))
+    };
+    Ok(PhantomView {
+        name: scenario.name.clone(),
+        faces_mm: (0..=tissue.layers.len()).map(|face| millimetres(tissue.front_m(face))).collect(),
+        layers: tissue.layers.iter().map(layer).collect(),
+        effects: scenario.effects.iter().map(effect).collect(),
+        tolerances: TOLERANCES.iter().filter_map(&mut tolerance_view).collect(),
+        motion: motion_text(&scenario.motion),
+        ron: ron(scenario)?,
+    })
+}
+
+/// Millimetres, rounded to 0.1 µm.
+pub fn millimetres(metres: f64) -> f64 {
+    (1e7 * metres).round() / 1e4
+}
+
+fn motion_text(motion: &Motion) -> String {
+    let mm = |x: f64| stylet_report::significant(1e3 * x, 3);
+    match motion {
+        Motion::Constant { velocity_mps, duration_s, .. } => {
+            format!("constant {} mm/s over {duration_s} s", mm(*velocity_mps))
+        }
+        Motion::Sinusoidal { amplitude_m, frequency_hz, duration_s, .. } => {
+            format!("sinusoidal, {} mm at {frequency_hz} Hz over {duration_s} s", mm(2.0 * amplitude_m))
+        }
+        Motion::Program { segments, .. } => segments.iter().map(segment_text).collect::<Vec<_>>().join(", "),
+        Motion::Recorded => "that of the recordings".to_owned(),
+    }
+}
+
+pub fn segment_text(segment: &Segment) -> String {
+    let mm = |x: f64| stylet_report::significant(1e3 * x, 3);
+    let s = |x: f64| stylet_report::significant(x, 3);
+    match *segment {
+        Segment::Move { velocity_mps, duration_s } => {
+            format!("{} mm/s for {} s", mm(velocity_mps), s(duration_s))
+        }
+        Segment::Hold { duration_s } => format!("hold {} s", s(duration_s)),
+        Segment::Ripple { velocity_mps, amplitude_mps, frequency_hz, duration_s } => format!(
+            "{} ± {} mm/s at {} Hz for {} s",
+            mm(velocity_mps),
+            mm(amplitude_mps),
+            s(frequency_hz),
+            s(duration_s)
+        ),
+    }
+}
+
+/// The phantom after an edit.
+///
+/// # Errors
+/// When the edit does not fit, or the result would be invalid.
+pub fn edited(studio: &mut Studio, edit: &Edit) -> Result<Scenario, Problem> {
+    let mut scenario = studio.now.phantom.clone();
+    let layers = &mut scenario.tissue.layers;
+    let gone = || Problem::new("the phantom has no such layer or effect any more");
+    match edit {
+        Edit::Face { face, depth_mm } => move_face(&mut scenario, *face, 1e-3 * depth_mm)?,
+        Edit::Layer { layer, field, to } => {
+            let scale = Scale::of_layer(field).ok_or_else(gone)?;
+            let value = scale.value(to)?;
+            let layer = layers.get_mut(*layer).ok_or_else(gone)?;
+            match (field.as_str(), value) {
+                ("puncture", value) => layer.puncture_n = value,
+                ("thickness", Some(value)) => layer.thickness_m = value,
+                ("stiffness", Some(value)) => layer.stiffness_n_per_m = value,
+                ("friction", Some(value)) => layer.friction_ns_per_m2 = value,
+                _ => return Err(gone()),
+            }
+        }
+        Edit::LayerName { layer, name } => layers.get_mut(*layer).ok_or_else(gone)?.name.clone_from(name),
+        Edit::SplitLayer { layer } => {
+            let first = layers.get_mut(*layer).ok_or_else(gone)?;
+            first.thickness_m = rounded(first.thickness_m / 2.0);
+            let second = first.clone();
+            layers.insert(layer + 1, second);
+        }
+        Edit::RemoveLayer { layer } => {
+            if layers.len() < 2 || *layer >= layers.len() {
+                return Err(Problem::new("a phantom needs at least one layer"));
+            }
+            layers.remove(*layer);
+        }
+        Edit::AddEffect { id } => {
+            let info = effect_info(id).ok_or_else(gone)?;
+            let typical: Vec<f64> =
+                info.parameters.iter().map(|p| p.demonstration.unwrap_or(p.start)).collect();
+            scenario.effects.push(AnyEffect::from_parameters(id, &typical).ok_or_else(gone)?);
+        }
+        Edit::Effect { effect, field, to } => {
+            let effect = scenario.effects.get_mut(*effect).ok_or_else(gone)?;
+            let mut values = effect.parameters();
+            let info = effect.info();
+            let index = info.parameters.iter().position(|p| p.path == field).ok_or_else(gone)?;
+            values[index] = Scale::of_parameter(&info.parameters[index]).value(to)?.ok_or_else(gone)?;
+            *effect = AnyEffect::from_parameters(info.id, &values).ok_or_else(gone)?;
+        }
+        Edit::RemoveEffect { effect } => {
+            if *effect >= scenario.effects.len() {
+                return Err(gone());
+            }
+            scenario.effects.remove(*effect);
+        }
+        Edit::Tolerance { field, to } => {
+            let value = Scale::of_tolerance(field).ok_or_else(gone)?.value(to)?;
+            *tolerance(&mut scenario, field).ok_or_else(gone)? = value.ok_or_else(gone)?;
+        }
+        Edit::Name { name } => scenario.name.clone_from(name),
+        Edit::Motion { name } => scenario.motion = library_motion(&scenario, name).ok_or_else(gone)?,
+        Edit::Scenario { name } => {
+            let (file, text) = SCENARIOS.iter().find(|(known, _)| known == name).ok_or_else(gone)?;
+            scenario = parse(file, text)?;
+        }
+        Edit::FromRecording { file, algorithm } => scenario = from_recording(studio, file, algorithm)?,
+        Edit::FromDiagnosis => scenario = studio.explained.extended()?,
+        Edit::FromPlan => scenario.motion = studio.explained.planned_motion()?,
+        Edit::Ron { text } => scenario = parse(PHANTOM, text)?,
+    }
+    scenario.check().map_err(|why| Problem::new(why.to_string()))?;
+    Ok(scenario)
+}
+
+/// Moves one face as far as its neighbours allow.
+fn move_face(scenario: &mut Scenario, face: usize, to_m: f64) -> Result<(), Problem> {
+    let tissue = &mut scenario.tissue;
+    let count = tissue.layers.len();
+    if face > count || !to_m.is_finite() {
+        return Err(Problem::new("the phantom has no such face any more"));
+    }
+    let low = if face == 0 { f64::NEG_INFINITY } else { tissue.front_m(face - 1) + MIN_THICKNESS_M };
+    let high = if face == count { f64::INFINITY } else { tissue.front_m(face + 1) - MIN_THICKNESS_M };
+    // To 0.01 mm.
+    let to_m = (1e5 * to_m.min(high).max(low)).round() / 1e5;
+    let moved_m = to_m - tissue.front_m(face);
+    if face == 0 {
+        tissue.surface_m = to_m;
+    } else {
+        tissue.layers[face - 1].thickness_m = rounded(tissue.layers[face - 1].thickness_m + moved_m);
+    }
+    if face < count {
+        tissue.layers[face].thickness_m = rounded(tissue.layers[face].thickness_m - moved_m);
+    }
+    Ok(())
+}
+
+/// A motion of the library through the whole phantom.
+fn library_motion(scenario: &Scenario, name: &str) -> Option<Motion> {
+    let start_m = scenario.tissue.surface_m - APPROACH_M;
+    let travel_m = scenario.tissue.end_m() - start_m;
+    let duration_s = rounded(travel_m / SPEED_MPS);
+    Some(match name {
+        "constant" => Motion::Constant { start_m, velocity_mps: SPEED_MPS, duration_s },
+        "sinusoidal" => Motion::Sinusoidal {
+            start_m,
+            amplitude_m: rounded(travel_m / 2.0),
+            frequency_hz: rounded(0.5 / duration_s),
+            phase_rad: stylet_scenario::PHASE_FROM_REST_RAD,
+            duration_s: 2.0 * duration_s,
+        },
+        "varied" => Motion::Program {
+            start_m,
+            segments: vec![
+                Segment::Move { velocity_mps: SPEED_MPS, duration_s: rounded(duration_s / 2.0) },
+                Segment::Hold { duration_s: 3.0 },
+                Segment::Ripple {
+                    velocity_mps: SPEED_MPS,
+                    amplitude_mps: SPEED_MPS / 2.0,
+                    frequency_hz: 0.5,
+                    duration_s: rounded(duration_s / 2.0),
+                },
+                Segment::Move { velocity_mps: -2.0 * SPEED_MPS, duration_s: rounded(duration_s / 4.0) },
+            ],
+        },
+        _ => return None,
+    })
+}
+
+/// Layers from the online algorithm's estimates: faces where ruptures were located, the last layer to below the deepest point.
+fn from_recording(studio: &mut Studio, file: &str, algorithm: &str) -> Result<Scenario, Problem> {
+    let loaded = studio.recording(file)?;
+    let run = look::run_algorithm(studio, file, algorithm)?;
+    let (recording, trace) = (&loaded.recording, &run.trace);
+    let surface_m = trace.contact_m.ok_or_else(|| {
+        Problem::new("no contact was detected in this recording, so there are no layers to start from; see its findings")
+    })?;
+    let deepest = (0..recording.len()).max_by(|a, b| recording.position_m[*a].total_cmp(&recording.position_m[*b]));
+    let deepest = deepest.unwrap_or(0);
+    let mut layers: Vec<Layer> = Vec::new();
+    let mut front_m = surface_m;
+    let mut push = |layers: &mut Vec<Layer>, back_m: f64, stiffness: f64, friction: f64| {
+        layers.push(Layer {
+            name: format!("layer {}", layers.len() + 1),
+            thickness_m: rounded((back_m - front_m).max(MIN_THICKNESS_M)),
+            stiffness_n_per_m: rounded(stiffness.max(0.0)),
+            friction_ns_per_m2: rounded(friction.max(0.0)),
+            puncture_n: None,
+        });
+        front_m = back_m;
+    };
+    for detection in &trace.detections {
+        let Some(e) = trace.estimates.iter().find(|e| e.layer == detection.layer) else { continue };
+        push(&mut layers, detection.located_m, e.stiffness_n_per_m, e.friction);
+    }
+    let last = |column: &[f64]| column.iter().take(deepest + 1).rev().copied().find(|v| v.is_finite());
+    let end_m = recording.position_m[deepest];
+    let beyond_m = (BEYOND.0 * (end_m - surface_m)).max(BEYOND.1);
+    push(
+        &mut layers,
+        end_m + beyond_m,
+        last(&trace.stiffness_n_per_m).unwrap_or(0.0),
+        last(&trace.friction).unwrap_or(0.0),
+    );
+    let start_m = recording.position_m.first().copied().unwrap_or(0.0);
+    let duration_s = recording.time_s[deepest] - recording.time_s[0];
+    let speed_mps = if duration_s > 0.0 { rounded((end_m - start_m) / duration_s) } else { SPEED_MPS };
+    let mut scenario = first()?;
+    scenario.name = file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned();
+    scenario.source = format!("layers found by stylet studio in {file}");
+    scenario.tissue = stylet_tissue::Tissue { surface_m: rounded(surface_m), layers };
+    scenario.motion =
+        Motion::Constant { start_m: rounded(start_m), velocity_mps: speed_mps, duration_s: rounded(duration_s) };
+    Ok(scenario)
+}
+
+/// Writes phantom and map.
+pub fn save(studio: &mut Studio) -> Result<StateView, Problem> {
+    studio.keep()?;
+    let folder = studio.folder().display().to_string();
+    studio.workspace.record(commands::open_again(&folder))?;
+    studio.state()
+}
+
+/// `stylet run` of the phantom.
+pub fn run(studio: &mut Studio) -> Result<RunResultView, Problem> {
+    studio.keep()?;
+    let file = studio.workspace.path(PHANTOM);
+    let name = file.display().to_string();
+    let failed = |why: stylet_api::Error| Problem::new(why.to_string());
+    // As the command reads it.
+    let scenario = Scenario::load(&file).map_err(|why| Problem::new(why.to_string()))?;
+    let run = stylet_api::simulate_from(&scenario, &name).map_err(failed)?;
+    let folder = studio.workspace.path("simulation");
+    let output = run.output(&name).map_err(failed)?;
+    output.write(&folder).map_err(failed)?;
+    studio.workspace.record(commands::run(&file, &folder, &output))?;
+    let first = run.algorithm_runs.first().and_then(|r| r.score.as_ref());
+    let found = first.map_or(String::new(), |s| {
+        format!("{} of {} ruptures found, {} false", s.ruptures.len() - s.missed, s.ruptures.len(), s.false_alarms)
+    });
+    Ok(RunResultView { summary: found, folder: "simulation".to_owned() })
+}
