@@ -26,17 +26,16 @@ export function upload(file) {
   return send(`upload/${encodeURIComponent(file.name)}`, { method: "POST", body: file });
 }
 
-// Calls `work` with the newest request only: while one is on its way, later ones replace each other.
-export function newestOnly(work) {
-  let busy = false, waiting = null;
+// Does one piece of work at a time, in order. A request that `replaceable` accepts gives way to the next one.
+export function inOrder(work, replaceable = () => true) {
+  const waiting = [];
+  let busy = false;
   return async function request(value) {
-    if (busy) { waiting = value; return; }
+    if (waiting.length && replaceable(waiting.at(-1))) waiting.pop();
+    waiting.push(value);
+    if (busy) return;
     busy = true;
-    try {
-      await work(value);
-    } finally {
-      busy = false;
-      if (waiting !== null) { const next = waiting; waiting = null; request(next); }
-    }
+    while (waiting.length) await work(waiting.shift());
+    busy = false;
   };
 }

@@ -58,9 +58,10 @@ export class Chart {
     if (!(low < high)) { low = 0; high = 1; }
     this.extent = [low, high];
     this.paintLegend();
-    if (keepRange && this.drawn) this.u.redraw(false, false);
-    else this.reset();
+    if (!keepRange || !this.drawn) this.reset();
     this.drawn = true;
+    this.fit();
+    this.u.redraw(false, false);
   }
 
   reset() {
