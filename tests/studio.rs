@@ -119,7 +119,11 @@ fn the_commands_of_the_drawer_give_the_bytes_that_the_page_wrote() {
     studio.call("diagnose", &json!({"files": ["recording.csv"]}));
     studio.wait_for_job();
     let state = studio.call("state", &json!({}));
-    assert!(state["diagnosis"]["sentence"].as_str().is_some_and(|s| s.contains("lacks")), "{}", state["diagnosis"]);
+    assert!(
+        state["diagnosis"]["sentence"].as_str().is_some_and(|s| s.contains("lacks")),
+        "{}",
+        state["diagnosis"]
+    );
     let commands = state["commands"].as_array().expect("commands");
     assert_eq!(commands.len(), 3, "{commands:?}");
     for (command, written, file) in [

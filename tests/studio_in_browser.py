@@ -162,7 +162,7 @@ def walk(page, studio, files, workspace, options):
     wait_drawn(page, "phantom")
     first = time.time() - start
     check(first < 3.0, f"the three-layer phantom is drawn {first:.2f} s after the page was asked for")
-    check(page.locator(".face").count() == 4, "four faces can be dragged")
+    check(page.locator("#view-phantom .face").count() == 4, "four faces can be dragged")
     # Text from outside stays text.
     page.get_by_label("name of layer 1").fill(ATTACK)
     page.get_by_label("name of layer 1").press("Enter")
@@ -237,7 +237,7 @@ def walk(page, studio, files, workspace, options):
 
 
 def drag(page):
-    face = page.locator(".face").nth(1)
+    face = page.locator("#view-phantom .face").nth(1)
     box = face.bounding_box()
     before = face.get_attribute("aria-valuenow")
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
@@ -253,7 +253,7 @@ def drag(page):
     page.wait_for_timeout(200)
     check(face.get_attribute("aria-valuenow") != before, f"a dragged face redraws at {frames / elapsed:.0f} frames per second")
     page.keyboard.press("Control+z")
-    page.wait_for_function("([n, v]) => document.querySelectorAll('.face')[n].getAttribute('aria-valuenow') === v", arg=[1, before])
+    page.wait_for_function("([n, v]) => document.querySelectorAll('#view-phantom .face')[n].getAttribute('aria-valuenow') === v", arg=[1, before])
     check(True, "one undo takes the whole movement back")
 
 

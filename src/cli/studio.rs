@@ -14,8 +14,9 @@ use stylet_studio::{Server, Studio};
 pub fn studio(args: &StudioArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(new_folder);
     let studio = Studio::open(&folder, &args.files).map_err(|problem| Failure::Check(problem.error))?;
-    let server = Server::start(studio, args.port)
-        .map_err(|why| Failure::Check(format!("--port {}: cannot serve there: {why}; try --port 0", args.port)))?;
+    let server = Server::start(studio, args.port).map_err(|why| {
+        Failure::Check(format!("--port {}: cannot serve there: {why}; try --port 0", args.port))
+    })?;
     let url = server.url();
     print(&format!(
         "Stylet Studio: {url}\nworkspace: {} (stylet studio --out {} opens it again)\nCtrl-C ends it.\n",

@@ -2,6 +2,7 @@
 import { h, fill } from "./dom.js";
 
 const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';
+const KEY_STEP_MM = { plain: 0.5, shift: 0.1 };
 const charts = new Set();
 
 export function colour(name) { return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim(); }
@@ -251,6 +252,7 @@ export class Chart {
   }
 
   hover() {
+    if (!this.drawn) return;
     const index = this.indexUnder();
     this.showSample(index);
     for (const partner of this.partners) partner.showSample(index);
@@ -263,6 +265,46 @@ export class Chart {
     this.dot.hidden = !known;
     if (known) Object.assign(this.dot.style, { left: `${this.u.valToPos(this.x[index], "x")}px`, top: `${this.u.valToPos(curve.y[index], "y")}px` });
   }
+}
+
+// A line at a depth that can be dragged and moved with the arrows. `moved(depth, last)`: `last` is false while the mouse moves.
+export function handle(u, name, moved, grabbed = () => {}) {
+  const element = h("div", { class: "face", role: "slider", tabindex: "0", "aria-orientation": "horizontal", "aria-label": name });
+  const depthAt = event => u.posToVal(event.clientX - u.over.getBoundingClientRect().left, "x");
+  let at = 0;
+  element.place = depth => {
+    const left = u.valToPos(depth, "x");
+    at = depth;
+    element.style.left = `${left}px`;
+    element.hidden = !(left >= -2 && left <= u.over.clientWidth + 2);
+    element.setAttribute("aria-valuenow", depth);
+    element.setAttribute("aria-valuetext", `${depth} mm`);
+  };
+  element.addEventListener("mousedown", event => event.stopPropagation());
+  element.addEventListener("pointerdown", event => {
+    event.preventDefault();
+    event.stopPropagation();
+    element.focus();
+    element.setPointerCapture(event.pointerId);
+    element.classList.add("dragging");
+    grabbed();
+  });
+  element.addEventListener("pointermove", event => { if (element.hasPointerCapture(event.pointerId)) moved(depthAt(event), false); });
+  element.addEventListener("pointerup", event => {
+    if (!element.hasPointerCapture(event.pointerId)) return;
+    element.releasePointerCapture(event.pointerId);
+    element.classList.remove("dragging");
+    moved(depthAt(event), true);
+  });
+  element.addEventListener("keydown", event => {
+    const direction = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
+    if (!direction) return;
+    event.preventDefault();
+    grabbed();
+    moved(at + direction * (event.shiftKey ? KEY_STEP_MM.shift : KEY_STEP_MM.plain), true);
+  });
+  u.over.append(element);
+  return element;
 }
 
 export function link(...linked) {

@@ -89,7 +89,6 @@ export class ExplainView {
 
   paintResult(found) {
     const { app } = this;
-    this.chartBox.hidden = !found;
     if (!found) {
       fill(this.result, h("div", { class: "hero" }, h("h2", {}, "Compare the phantom with recordings"),
         h("p", {}, "The diagnosis fits the phantom's layers to the recordings, searches the library of effects for what the phantom lacks, and says how much better the extended phantom predicts."),
@@ -132,8 +131,9 @@ export class ExplainView {
 
   async paintCurves() {
     const { state, file } = this.app, found = state.diagnosis;
-    if (!found || !file) { this.chartBox.hidden = true; return; }
-    const on = found.causes.map(cause => cause.id).filter(id => !this.off.has(id));
+    this.chartBox.hidden = !file;
+    if (!file) return;
+    const on = (found?.causes || []).map(cause => cause.id).filter(id => !this.off.has(id));
     const { curves, summary } = await call("causes", { file, causes: on });
     this.chartBox.hidden = false;
     this.chart.set({ x: curves.time_s, curves: curves.forces.map(force => ({ name: force.name, y: force.force_n, ...CURVES[force.role] })) });

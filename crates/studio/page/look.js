@@ -1,14 +1,14 @@
 // Look: the recording over time and depth, with contact, ruptures and enhanced force of the online algorithms.
 import { call, inOrder } from "./api.js";
 import { h, fill, button, select, findings, table } from "./dom.js";
-import { Chart, link } from "./chart.js";
+import { Chart, handle, link } from "./chart.js";
 
 const COLOURS = { Stylet: "enhanced", Paper: "paper-algorithm" };
 const AREAS = ["area0", "area1", "area2", "area3"];
 
 export class LookView {
   constructor(root, app) {
-    Object.assign(this, { root, app, algorithms: ["Stylet"], drawn: "" });
+    Object.assign(this, { root, app, algorithms: ["Stylet"], contacts: new Map() });
     this.empty = h("div", { class: "drop" }, h("p", {}, "No recording yet."), button("Choose recordings …", () => document.getElementById("chooser").click(), { class: "primary" }));
     this.bar = h("div", { class: "bar" });
     const plots = h("div", { class: "plots" });
@@ -21,11 +21,31 @@ export class LookView {
     this.speed = new Chart(plots, { x: "time (s)", y: "velocity (mm/s)", share: 0.17, label: "velocity over time" });
     link(this.time, this.depth, this.motion, this.speed);
     const zoomed = inOrder(window => this.app.attempt(() => this.load(window)));
+    this.moved = zoomed;
+    this.contactHandle();
     const wait = { timer: 0 };
     for (const chart of [this.time, this.motion, this.speed]) {
       chart.onzoom = window => { clearTimeout(wait.timer); wait.timer = setTimeout(() => zoomed(window ?? []), 120); };
     }
     for (const chart of [this.time, this.depth, this.motion, this.speed]) chart.onhover = index => this.read(index);
+  }
+
+  // The depth of the contact that the user gave for the recording shown.
+  contact() { return this.contacts.get(this.app.file) ?? null; }
+
+  // The contact can be dragged over depth, or moved with the arrows.
+  contactHandle() {
+    const { u } = this.depth;
+    const element = handle(u, "contact", depth_mm => {
+      this.contacts.set(this.app.file, depth_mm);
+      this.moved([]);
+    });
+    element.classList.add("contact");
+    this.depth.ondraw = () => {
+      const at = this.found?.runs[0]?.contact?.depth_mm ?? null;
+      element.hidden = at === null;
+      if (at !== null) element.place(at);
+    };
   }
 
   async update() {
@@ -38,7 +58,7 @@ export class LookView {
 
   async load(window) {
     const window_s = window.length === 2 ? window : undefined;
-    const found = await call("look", { file: this.app.file, algorithms: this.algorithms, window_s });
+    const found = await call("look", { file: this.app.file, algorithms: this.algorithms, contact_mm: this.contact(), window_s });
     const start = performance.now();
     this.found = found;
     this.draw(found, Boolean(window_s));
@@ -98,19 +118,19 @@ export class LookView {
       findings(found.findings),
       found.runs.map(run => h("section", { class: "card" },
         h("h2", {}, run.algorithm),
-        h("p", {}, run.contact_text),
+        h("p", {}, run.contact_text, this.contact() !== null && button("as detected", () => { this.contacts.delete(file); this.moved([]); }, { class: "quiet" })),
         h("p", {}, `${run.ruptures.length} rupture${run.ruptures.length === 1 ? "" : "s"}`),
         run.table.rows.length > 0 && table(run.table, `layers found by ${run.algorithm}`),
         h("div", { class: "row" },
           button("Start a phantom from these layers →", () => app.attempt(async () => {
-            await call("edit", { edit: { kind: "from_recording", file, algorithm: run.algorithm } });
+            await call("edit", { edit: { kind: "from_recording", file, algorithm: run.algorithm, contact_mm: this.contact() } });
             app.views.phantom.along = file;
             app.state = await call("state");
             await app.show("phantom");
             await app.refresh(app.state);
           }), { class: "primary", disabled: !run.contact }),
           button("Write results", () => app.attempt(async () => {
-            const written = await call("enhance", { file, algorithms: [run.algorithm] });
+            const written = await call("enhance", { file, algorithms: [run.algorithm], contact_mm: this.contact() });
             app.alert(written.summary, "good");
             await app.refresh();
           }))))),

@@ -1,7 +1,7 @@
 // Phantom: layers with draggable faces on the force over depth, numbers as sliders, effects, and the predicted force.
 import { call, inOrder } from "./api.js";
 import { h, fill, button, select, slider } from "./dom.js";
-import { Chart, link } from "./chart.js";
+import { Chart, handle, link } from "./chart.js";
 
 const AREAS = ["area0", "area1", "area2", "area3"];
 const CURVES = {
@@ -9,7 +9,6 @@ const CURVES = {
   predicted: { colour: "predicted", width: 2 },
   tip: { colour: "tip", width: 1.4, dash: [5, 3] },
 };
-const KEY_STEP_MM = { plain: 0.5, shift: 0.1 };
 
 export class PhantomView {
   constructor(root, app) {
@@ -71,51 +70,16 @@ export class PhantomView {
 
   // The handles on the faces.
   placeHandles() {
-    const faces = this.app.state?.phantom.faces_mm || [], { u } = this.depth;
+    const faces = this.app.state?.phantom.faces_mm || [];
     while (this.handles.length > faces.length) this.handles.pop().remove();
-    while (this.handles.length < faces.length) this.handles.push(this.handle(this.handles.length));
-    for (const [k, handle] of this.handles.entries()) {
-      const left = u.valToPos(faces[k], "x"), name = k === 0 ? "surface" : k === faces.length - 1 ? "far face" : `face ${k}`;
-      handle.style.left = `${left}px`;
-      handle.hidden = !(left >= -2 && left <= u.over.clientWidth + 2);
-      handle.setAttribute("aria-label", name);
-      handle.setAttribute("aria-valuenow", faces[k]);
-      handle.setAttribute("aria-valuetext", `${faces[k]} mm`);
-      handle.dataset.text = `${faces[k]} mm`;
+    while (this.handles.length < faces.length) {
+      const face = this.handles.length;
+      this.handles.push(handle(this.depth.u, "", (depth_mm, last) => this.edit({ kind: "face", face, depth_mm }, last), () => this.stroke++));
     }
-  }
-
-  handle(face) {
-    const element = h("div", { class: "face", role: "slider", tabindex: "0", "aria-orientation": "horizontal" });
-    const { u } = this.depth;
-    element.addEventListener("mousedown", event => event.stopPropagation());
-    element.addEventListener("pointerdown", event => {
-      event.preventDefault();
-      event.stopPropagation();
-      element.focus();
-      element.setPointerCapture(event.pointerId);
-      element.classList.add("dragging");
-      this.stroke++;
-    });
-    const depthAt = event => u.posToVal(event.clientX - u.over.getBoundingClientRect().left, "x");
-    element.addEventListener("pointermove", event => {
-      if (element.hasPointerCapture(event.pointerId)) this.edit({ kind: "face", face, depth_mm: depthAt(event) }, false);
-    });
-    element.addEventListener("pointerup", event => {
-      if (!element.hasPointerCapture(event.pointerId)) return;
-      element.releasePointerCapture(event.pointerId);
-      element.classList.remove("dragging");
-      this.edit({ kind: "face", face, depth_mm: depthAt(event) });
-    });
-    element.addEventListener("keydown", event => {
-      const direction = { ArrowLeft: -1, ArrowRight: 1 }[event.key];
-      if (!direction) return;
-      event.preventDefault();
-      const step = event.shiftKey ? KEY_STEP_MM.shift : KEY_STEP_MM.plain;
-      this.discrete({ kind: "face", face, depth_mm: this.app.state.phantom.faces_mm[face] + direction * step });
-    });
-    u.over.append(element);
-    return element;
+    for (const [k, element] of this.handles.entries()) {
+      element.place(faces[k]);
+      element.setAttribute("aria-label", k === 0 ? "surface" : k === faces.length - 1 ? "far face" : `face ${k}`);
+    }
   }
 
   // A slider of the panel, kept as long as the panel has the same shape, so that it keeps the focus.
@@ -163,6 +127,7 @@ export class PhantomView {
       select("motion", [["", "its own motion"], ...app.state.files.map(file => [file, `along ${file}`])], this.along || "", file => { this.along = file || null; app.attempt(() => this.update()); }),
       !this.along && select("another motion", [["", phantom.motion.length > 46 ? phantom.motion.slice(0, 45) + "…" : phantom.motion], ...app.library.motions], "", name => { if (name) this.discrete({ kind: "motion", name }); }),
       app.state.plan && button("Use the planned motion", () => { this.along = null; this.discrete({ kind: "from_plan" }); }),
+      app.state.files.length === 0 && h("span", { class: "soft" }, "Drop a recording anywhere on the page to compare it with this phantom."),
       app.state.files.length > 0 && button("Explain →", () => app.show("explain"), { class: "primary right" }));
   }
 

@@ -7,7 +7,11 @@ use stylet_api::{DiagnosisInputs, OutputFiles};
 /// A word for the shell.
 fn word(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,@%+".contains(c);
-    if !text.is_empty() && text.chars().all(plain) { text.to_owned() } else { format!("'{}'", text.replace('\'', "'\\''")) }
+    if !text.is_empty() && text.chars().all(plain) {
+        text.to_owned()
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    }
 }
 
 fn path(path: &Path) -> String {
@@ -37,12 +41,18 @@ fn command(shell: String, python: String, files: Vec<String>) -> CommandView {
 
 /// `--columns FILE`, and the same for Python.
 fn columns(file: Option<&Path>) -> (String, String) {
-    file.map_or_else(Default::default, |f| (format!(" --columns {}", path(f)), format!(", columns={}", text(f))))
+    file.map_or_else(Default::default, |f| {
+        (format!(" --columns {}", path(f)), format!(", columns={}", text(f)))
+    })
 }
 
 pub fn open_again(folder: &str) -> CommandView {
     let shell = format!("stylet studio --out {}", word(folder));
-    CommandView { shell, python: "# the studio is a page; its files are the interface to Python".to_owned(), files: Vec::new() }
+    CommandView {
+        shell,
+        python: "# the studio is a page; its files are the interface to Python".to_owned(),
+        files: Vec::new(),
+    }
 }
 
 pub fn run(scenario: &Path, folder: &Path, output: &OutputFiles) -> CommandView {
@@ -53,7 +63,13 @@ pub fn run(scenario: &Path, folder: &Path, output: &OutputFiles) -> CommandView 
     )
 }
 
-pub fn enhance(data: &Path, map: Option<&Path>, config: Option<&Path>, folder: &Path, output: &OutputFiles) -> CommandView {
+pub fn enhance(
+    data: &Path,
+    map: Option<&Path>,
+    config: Option<&Path>,
+    folder: &Path,
+    output: &OutputFiles,
+) -> CommandView {
     let (shell_map, python_map) = columns(map);
     let shell_config = config.map(|c| format!(" --config {}", path(c))).unwrap_or_default();
     let python_config = config.map(|c| format!(", {}", text(c))).unwrap_or_default();
@@ -85,7 +101,8 @@ pub fn diagnose(inputs: &DiagnosisInputs, folder: &Path, output: &OutputFiles) -
 
 pub fn plan(inputs: &DiagnosisInputs, limits: &Path, motion: &Path) -> CommandView {
     let (shell_map, python_map) = columns(inputs.columns.as_deref());
-    let data = if inputs.data.is_empty() { String::new() } else { format!(" --data {}", paths(&inputs.data)) };
+    let data =
+        if inputs.data.is_empty() { String::new() } else { format!(" --data {}", paths(&inputs.data)) };
     command(
         format!(
             "stylet plan {}{data}{shell_map} --limits {} --quick --out {}",

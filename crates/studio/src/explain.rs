@@ -5,6 +5,7 @@ use crate::job::Job;
 use crate::messages::*;
 use crate::phantom::{millimetres, segment_text, title};
 use crate::preview::{curves, rms_text};
+use crate::sliders::rounded;
 use crate::studio::Studio;
 use crate::workspace::{LIMITS, PHANTOM, Workspace};
 use stylet_api::plan_insertion::{self, PlanReport};
@@ -151,16 +152,17 @@ pub fn start_diagnosis(studio: &mut Studio, request: FilesRequest) -> Result<Job
 fn diagnosis_view(d: &Diagnosis) -> DiagnosisView {
     let number = |x: f64| significant(x, 4);
     let interval = |low: f64, high: f64| format!("{} to {}", number(low), number(high));
-    let causes = d.causes.iter().map(|c| {
-        let mut lines = vec![format!("confidence {}", significant(c.confidence, 3))];
-        lines.extend(c.parameters.iter().map(|(path, e)| {
-            format!("{path} = {} (95 %: {})", number(e.value), interval(e.low, e.high))
-        }));
-        if !c.equivalent.is_empty() {
-            lines.push(format!("equivalent: {}", c.equivalent.join(", ")));
-        }
-        CauseView { id: c.effect.clone(), title: title(&c.effect), lines }
-    });
+    let causes =
+        d.causes.iter().map(|c| {
+            let mut lines = vec![format!("confidence {}", significant(c.confidence, 3))];
+            lines.extend(c.parameters.iter().map(|(path, e)| {
+                format!("{path} = {} (95 %: {})", number(e.value), interval(e.low, e.high))
+            }));
+            if !c.equivalent.is_empty() {
+                lines.push(format!("equivalent: {}", c.equivalent.join(", ")));
+            }
+            CauseView { id: c.effect.clone(), title: title(&c.effect), lines }
+        });
     let rows = d.base_parameters.iter().map(|p| {
         let whose = if p.layer == 0 { "tissue".to_owned() } else { format!("layer {}", p.layer) };
         let remark = match (p.at_bound, p.changed) {
@@ -168,7 +170,14 @@ fn diagnosis_view(d: &Diagnosis) -> DiagnosisView {
             (_, true) => "changed",
             _ => "",
         };
-        vec![whose, p.name.clone(), number(p.assumed), number(p.value), interval(p.low, p.high), remark.to_owned()]
+        vec![
+            whose,
+            p.name.clone(),
+            number(p.assumed),
+            number(p.value),
+            interval(p.low, p.high),
+            remark.to_owned(),
+        ]
     });
     let g = &d.gain;
     let what = if g.held_out { "on held-out recordings" } else { "on the one recording, which was fitted" };
@@ -197,7 +206,7 @@ fn diagnosis_view(d: &Diagnosis) -> DiagnosisView {
 /// The limits of the workspace, or those at first.
 pub fn limits(studio: &Studio) -> LimitsView {
     let kept = studio.workspace.read(LIMITS).and_then(|text| stylet_scenario::parse(LIMITS, &text).ok());
-    let depth_m = studio.now.phantom.tissue.end_m();
+    let depth_m = rounded(studio.now.phantom.tissue.end_m());
     let l: Limits = kept.unwrap_or(Limits { depth_m, ..LIMITS_AT_FIRST });
     LimitsView {
         depth_mm: millimetres(l.depth_m),
@@ -234,6 +243,10 @@ pub fn start_plan(studio: &mut Studio, request: PlanRequest) -> Result<JobView, 
     Ok(begun(studio, job))
 }
 
+fn whole_percent(share: f64) -> String {
+    format!("{:.0} %", 100.0 * share)
+}
+
 fn plan_view(report: &PlanReport) -> PlanView {
     let plan = &report.plan;
     let mut pairs: Vec<_> = plan.pairs.iter().filter(|p| p.distinguishable).collect();
@@ -244,8 +257,8 @@ fn plan_view(report: &PlanReport) -> PlanView {
         true => "no remaining pair of candidates can be told apart within these limits".to_owned(),
         false => format!(
             "the next diagnosis names the right cause with probability {}, now {}",
-            percent(plan.probability_decided),
-            percent(plan.probability_now)
+            whole_percent(plan.probability_decided),
+            whole_percent(plan.probability_now)
         ),
     };
     PlanView {
@@ -262,7 +275,9 @@ fn plan_view(report: &PlanReport) -> PlanView {
         pairs: pairs
             .iter()
             .take(MAX_PAIRS)
-            .map(|p| vec![title(&p.a), title(&p.b), significant(p.nats_before, 2), significant(p.nats_after, 3)])
+            .map(|p| {
+                vec![title(&p.a), title(&p.b), significant(p.nats_before, 2), significant(p.nats_after, 3)]
+            })
             .collect(),
         time_s: (0..=MOTION_POINTS).map(at).collect(),
         depth_mm: (0..=MOTION_POINTS)
@@ -289,7 +304,8 @@ pub fn start_prediction(studio: &mut Studio, request: FilesRequest) -> Result<Jo
         let recordings = inputs.read_recordings().map_err(failed)?;
         stage("predicting");
         let (diagnosis, assumed) = (diagnosis.as_ref(), assumed.as_ref());
-        let found = stylet_api::predict_recordings(&scenario, diagnosis, assumed, &[], &recordings).map_err(failed)?;
+        let found = stylet_api::predict_recordings(&scenario, diagnosis, assumed, &[], &recordings)
+            .map_err(failed)?;
         let output = prediction_files::output_files(&scenario, &model, &found).map_err(failed)?;
         stage("writing the results");
         output.write(&folder).map_err(failed)?;
@@ -308,29 +324,30 @@ pub fn start_prediction(studio: &mut Studio, request: FilesRequest) -> Result<Jo
     Ok(begun(studio, job))
 }
 
-/// Measured force, that of the phantom, and that of the diagnosed model with some of its causes.
+/// Measured force, that of the phantom, and, after a diagnosis, that of its model with some of the causes.
 pub fn without_causes(studio: &mut Studio, request: CausesRequest) -> Result<CausesView, Problem> {
     let loaded = studio.recording(&request.file)?;
-    let mut model = studio.explained.extended()?;
-    let found: Vec<&str> = studio.explained.diagnosis.iter().flat_map(|d| &d.view.causes).map(|c| c.id.as_str()).collect();
-    model.effects.retain(|e| {
-        let id = e.info().id;
-        !found.contains(&id) || request.causes.iter().any(|on| on == id)
-    });
-    let assumed_n = force_along_motion(&studio.now.phantom, &loaded.recording).map_err(failed)?;
-    let model_n = force_along_motion(&model, &loaded.recording).map_err(failed)?;
     let measured_n = &loaded.recording.force_n;
-    let forces = [
-        ("measured", "measured", measured_n.as_slice()),
-        ("assumed", "phantom", &assumed_n),
-        ("extended", "diagnosed model", &model_n),
-    ];
-    Ok(CausesView {
-        summary: format!(
-            "Error of the phantom {}, of the diagnosed model with the causes switched on {}.",
-            rms_text(measured_n, &assumed_n),
+    let assumed_n = force_along_motion(&studio.now.phantom, &loaded.recording).map_err(failed)?;
+    let mut forces = vec![("measured", "measured", measured_n.as_slice()), ("assumed", "phantom", &assumed_n)];
+    let mut summary = format!("error of the phantom {}", rms_text(measured_n, &assumed_n));
+    let model_n = match &studio.explained.diagnosis {
+        Some(diagnosed) => {
+            let switched_off = |id: &str| {
+                diagnosed.view.causes.iter().any(|c| c.id == id) && !request.causes.iter().any(|on| on == id)
+            };
+            let mut model = diagnosed.extended.clone();
+            model.effects.retain(|e| !switched_off(e.info().id));
+            force_along_motion(&model, &loaded.recording).map_err(failed)?
+        }
+        None => Vec::new(),
+    };
+    if !model_n.is_empty() {
+        forces.push(("extended", "diagnosed model", &model_n));
+        summary += &format!(
+            ", of the diagnosed model with the causes that are switched on {}",
             rms_text(measured_n, &model_n)
-        ),
-        curves: curves(&loaded.recording, &forces, MAX_POINTS),
-    })
+        );
+    }
+    Ok(CausesView { curves: curves(&loaded.recording, &forces, MAX_POINTS), summary })
 }

@@ -58,7 +58,15 @@ impl<T: Send + 'static> Work<T> {
             .spawn(run)
             .map_err(|why| Problem::new(format!("no thread can be started: {why}")))?;
         let started = Instant::now();
-        Ok(Self { kind, started, cancelled, progress, state: "running", error: String::new(), elapsed_s: 0.0 })
+        Ok(Self {
+            kind,
+            started,
+            cancelled,
+            progress,
+            state: "running",
+            error: String::new(),
+            elapsed_s: 0.0,
+        })
     }
 
     pub fn is_running(&self) -> bool {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use stylet_api::enhancement::{ResultSource, enhance_recording};
 use stylet_api::{AlgorithmRun, EnhancerConfigFile, Recording, enhance};
 use stylet_core::LayerEstimate;
-use stylet_core::config::Algorithm;
+use stylet_core::config::{Algorithm, Contact};
 use stylet_record::QualityNote;
 use stylet_report::{plus_minus, significant};
 
@@ -21,26 +21,37 @@ const MAX_LISTED: usize = 60;
 /// The online algorithms, the default first.
 pub const ALGORITHMS: [(&str, Algorithm); 2] = [("Stylet", Algorithm::Stylet), ("Paper", Algorithm::Paper)];
 
-fn config(algorithm: &str) -> Result<EnhancerConfigFile, Problem> {
+/// Configuration for an algorithm, with a contact depth that the user gave.
+fn config(algorithm: &str, contact_mm: Option<f64>) -> Result<EnhancerConfigFile, Problem> {
     let (_, chosen) = ALGORITHMS
         .iter()
         .find(|(name, _)| *name == algorithm)
         .ok_or_else(|| Problem::new(format!("there is no algorithm {algorithm:?}")))?;
     let mut config = EnhancerConfigFile::default();
     config.enhance.algorithm = *chosen;
+    if let Some(contact_mm) = contact_mm {
+        config.surface_m = 1e-3 * contact_mm;
+        config.enhance.contact = Contact::Known;
+    }
     Ok(config)
 }
 
-/// The outputs of an algorithm for a recording; those of the recording shown last are kept.
-pub fn run_algorithm(studio: &mut Studio, file: &str, algorithm: &str) -> Result<Arc<AlgorithmRun>, Problem> {
-    let known = studio.enhanced.iter().find(|(f, a, _)| f == file && a == algorithm);
-    if let Some((_, _, run)) = known {
+/// The outputs of an algorithm for a recording; those shown last are kept.
+pub fn run_algorithm(
+    studio: &mut Studio,
+    file: &str,
+    algorithm: &str,
+    contact_mm: Option<f64>,
+) -> Result<Arc<AlgorithmRun>, Problem> {
+    let key = format!("{algorithm} {contact_mm:?} {file}");
+    if let Some((_, run)) = studio.enhanced.iter().find(|(known, _)| *known == key) {
         return Ok(run.clone());
     }
     let loaded = studio.recording(file)?;
-    let run = Arc::new(enhance(&loaded.recording, &config(algorithm)?));
-    studio.enhanced.retain(|(f, _, _)| f == file);
-    studio.enhanced.push((file.to_owned(), algorithm.to_owned(), run.clone()));
+    let run = Arc::new(enhance(&loaded.recording, &config(algorithm, contact_mm)?));
+    let surplus = (studio.enhanced.len() + 1).saturating_sub(ALGORITHMS.len());
+    studio.enhanced.drain(..surplus);
+    studio.enhanced.push((key, run.clone()));
     Ok(run)
 }
 
@@ -74,7 +85,7 @@ pub fn look(studio: &mut Studio, request: LookRequest) -> Result<LookView, Probl
     let recording = &loaded.recording;
     let mut runs = Vec::new();
     for algorithm in request.algorithms.iter().take(ALGORITHMS.len()) {
-        runs.push((algorithm.as_str(), run_algorithm(studio, &request.file, algorithm)?));
+        runs.push((algorithm.as_str(), run_algorithm(studio, &request.file, algorithm, request.contact_mm)?));
     }
     let shown = window(recording, request.window_s);
     let part = |column: &[f64]| column.get(shown.clone()).unwrap_or_default().to_vec();
@@ -133,7 +144,11 @@ fn run_view(algorithm: &str, run: &AlgorithmRun, recording: &Recording) -> RunVi
     }
     let deepest = recording.samples().max_by(|a, b| a.position_m.total_cmp(&b.position_m));
     if let (Some(front), Some(end)) = (&front, deepest) {
-        layers.push(span(format!("layer {}", layers.len() + 1), front, (millimetres(end.position_m), end.time_s)));
+        layers.push(span(
+            format!("layer {}", layers.len() + 1),
+            front,
+            (millimetres(end.position_m), end.time_s),
+        ));
     }
     RunView {
         algorithm: algorithm.to_owned(),
@@ -172,25 +187,32 @@ fn layer_row(e: &LayerEstimate) -> Vec<String> {
 /// `stylet enhance` of a recording.
 pub fn write_enhancement(studio: &mut Studio, request: LookRequest) -> Result<RunResultView, Problem> {
     let algorithm = request.algorithms.first().map_or(ALGORITHMS[0].0, String::as_str);
-    let config = config(algorithm)?;
+    let config = config(algorithm, request.contact_mm)?;
     studio.keep()?;
     let workspace = &studio.workspace;
     let data = workspace.data(&request.file)?;
     let map = studio.map_file();
-    let config_file = (algorithm != ALGORITHMS[0].0).then(|| format!("enhance-{}.ron", algorithm.to_lowercase()));
+    let stem = request.file.rsplit_once('.').map_or(&*request.file, |(stem, _)| stem);
+    let settings: Vec<String> = (algorithm != ALGORITHMS[0].0)
+        .then(|| format!("algorithm: {algorithm}"))
+        .into_iter()
+        .chain(request.contact_mm.map(|mm| format!("contact: Known, surface_m: {}", 1e-3 * mm)))
+        .collect();
+    let config_file = (!settings.is_empty()).then(|| format!("enhance-{stem}.ron"));
     if let Some(name) = &config_file {
-        workspace.write(name, format!("Enhance(algorithm: {algorithm})\n").as_bytes())?;
+        workspace.write(name, format!("Enhance({})\n", settings.join(", ")).as_bytes())?;
     }
     let config_path = config_file.map(|name| workspace.path(&name));
     let failed = |why: stylet_api::Error| Problem::new(why.to_string());
     // As the command reads it.
     let (recording, notes) = stylet_record::read_csv(&data, &studio.read_options())
         .map_err(|why| Problem::new(why.to_string()))?;
-    let folder_name = format!("enhanced-{}", request.file.rsplit_once('.').map_or(&*request.file, |(stem, _)| stem));
+    let folder_name = format!("enhanced-{stem}");
     let folder = studio.workspace.path(&folder_name);
     let regressor = config.enhance.model;
     let result = enhance_recording(recording, notes, config, &[regressor], None).map_err(failed)?;
-    let mut command = commands::enhance(&data, map.as_deref(), config_path.as_deref(), &folder, &Default::default());
+    let mut command =
+        commands::enhance(&data, map.as_deref(), config_path.as_deref(), &folder, &Default::default());
     let source = ResultSource { data: &data, config: config_path.as_deref(), command: command.shell.clone() };
     let output = result.output_files(&source).map_err(failed)?;
     output.write(&folder).map_err(failed)?;

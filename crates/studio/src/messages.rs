@@ -151,6 +151,8 @@ pub enum Edit {
     FromRecording {
         file: String,
         algorithm: String,
+        #[serde(default)]
+        contact_mm: Option<f64>,
     },
     FromDiagnosis,
     FromPlan,
@@ -241,6 +243,9 @@ pub struct EditView {
 pub struct LookRequest {
     pub file: String,
     pub algorithms: Vec<String>,
+    /// Depth of the contact, where the user knows better than the algorithm.
+    #[serde(default)]
+    pub contact_mm: Option<f64>,
     /// Visible part of the recording in s.
     #[serde(default)]
     pub window_s: Option<[f64; 2]>,
@@ -391,7 +396,6 @@ pub struct DiagnosisView {
     pub not_identifiable: Vec<String>,
     pub folder: String,
 }
-
 
 /// An identified effect.
 #[derive(Clone, Debug, Serialize)]

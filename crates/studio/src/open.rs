@@ -41,6 +41,11 @@ fn column<'a>(map: &'a ColumnMap, quantity: &str) -> Option<&'a Column> {
     }
 }
 
+/// SI units per unit of the file.
+fn scale(column: &Column) -> f64 {
+    serde_json::to_value(column).ok().and_then(|column| column["scale"].as_f64()).unwrap_or(1.0)
+}
+
 fn set(map: &mut ColumnMap, quantity: &str, column: Option<Column>) {
     let required = |column: Option<Column>| column.unwrap_or_else(|| Column::si(""));
     match quantity {
@@ -132,10 +137,10 @@ fn columns(map: &ColumnMap, sample: Sample) -> Vec<ColumnView> {
         ColumnView {
             quantity: used.map_or("", |(quantity, _, _)| quantity),
             unit: used.map_or(String::new(), |(_, units, column)| {
-                let known = units.iter().find(|(_, size)| *size == column.scale.abs());
-                known.map_or(format!("× {}", column.scale.abs()), |(unit, _)| (*unit).to_owned())
+                let known = units.iter().find(|(_, size)| *size == scale(column).abs());
+                known.map_or(format!("× {}", scale(column).abs()), |(unit, _)| (*unit).to_owned())
             }),
-            flipped: used.is_some_and(|(_, _, column)| column.scale < 0.0),
+            flipped: used.is_some_and(|(_, _, column)| scale(column) < 0.0),
             reason: String::new(),
             range: format!("{} to {}", significant(low, 4), significant(high, 4)),
             name,

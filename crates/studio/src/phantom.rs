@@ -1,13 +1,15 @@
 //! The phantom: a scenario that is edited with the mouse.
 
 use crate::messages::*;
+pub use crate::preview::preview;
 use crate::sliders::{Scale, rounded};
 use crate::studio::Studio;
 use crate::workspace::PHANTOM;
 use crate::{commands, look};
-pub use crate::preview::preview;
 use stylet_scenario::{Motion, Scenario, Segment};
-use stylet_tissue::{AnyEffect, Effect as _, EffectInfo, Layer, effect_info, general_effects, per_layer_effects};
+use stylet_tissue::{
+    AnyEffect, Effect as _, EffectInfo, Layer, effect_info, general_effects, per_layer_effects,
+};
 
 /// Thinnest layer that a dragged face leaves, in m.
 const MIN_THICKNESS_M: f64 = 5e-4;
@@ -176,7 +178,7 @@ pub fn segment_text(segment: &Segment) -> String {
         Segment::Ripple { velocity_mps, amplitude_mps, frequency_hz, duration_s } => format!(
             "{} ± {} mm/s at {} Hz for {} s",
             mm(velocity_mps),
-            mm(amplitude_mps),
+            mm(amplitude_mps.abs()),
             s(frequency_hz),
             s(duration_s)
         ),
@@ -248,7 +250,9 @@ pub fn edited(studio: &mut Studio, edit: &Edit) -> Result<Scenario, Problem> {
             let (file, text) = SCENARIOS.iter().find(|(known, _)| known == name).ok_or_else(gone)?;
             scenario = parse(file, text)?;
         }
-        Edit::FromRecording { file, algorithm } => scenario = from_recording(studio, file, algorithm)?,
+        Edit::FromRecording { file, algorithm, contact_mm } => {
+            scenario = from_recording(studio, file, algorithm, *contact_mm)?;
+        }
         Edit::FromDiagnosis => scenario = studio.explained.extended()?,
         Edit::FromPlan => scenario.motion = studio.explained.planned_motion()?,
         Edit::Ron { text } => scenario = parse(PHANTOM, text)?,
@@ -312,41 +316,46 @@ fn library_motion(scenario: &Scenario, name: &str) -> Option<Motion> {
     })
 }
 
+/// A layer with rounded numbers that a scenario admits.
+fn layer(index: usize, thickness_m: f64, stiffness: f64, friction: f64, puncture_n: Option<f64>) -> Layer {
+    Layer {
+        name: format!("layer {}", index + 1),
+        thickness_m: rounded(thickness_m.max(MIN_THICKNESS_M)),
+        stiffness_n_per_m: rounded(stiffness.max(0.0)),
+        friction_ns_per_m2: rounded(friction.max(0.0)),
+        puncture_n: puncture_n.filter(|force_n| *force_n > 0.0),
+    }
+}
+
 /// Layers from the online algorithm's estimates: faces where ruptures were located, the last layer to below the deepest point.
-fn from_recording(studio: &mut Studio, file: &str, algorithm: &str) -> Result<Scenario, Problem> {
+fn from_recording(studio: &mut Studio, file: &str, algorithm: &str, contact_mm: Option<f64>) -> Result<Scenario, Problem> {
     let loaded = studio.recording(file)?;
-    let run = look::run_algorithm(studio, file, algorithm)?;
+    let run = look::run_algorithm(studio, file, algorithm, contact_mm)?;
     let (recording, trace) = (&loaded.recording, &run.trace);
     let surface_m = trace.contact_m.ok_or_else(|| {
         Problem::new("no contact was detected in this recording, so there are no layers to start from; see its findings")
     })?;
-    let deepest = (0..recording.len()).max_by(|a, b| recording.position_m[*a].total_cmp(&recording.position_m[*b]));
+    let deepest =
+        (0..recording.len()).max_by(|a, b| recording.position_m[*a].total_cmp(&recording.position_m[*b]));
     let deepest = deepest.unwrap_or(0);
     let mut layers: Vec<Layer> = Vec::new();
     let mut front_m = surface_m;
-    let mut push = |layers: &mut Vec<Layer>, back_m: f64, stiffness: f64, friction: f64| {
-        layers.push(Layer {
-            name: format!("layer {}", layers.len() + 1),
-            thickness_m: rounded((back_m - front_m).max(MIN_THICKNESS_M)),
-            stiffness_n_per_m: rounded(stiffness.max(0.0)),
-            friction_ns_per_m2: rounded(friction.max(0.0)),
-            puncture_n: None,
-        });
+    for (k, detection) in trace.detections.iter().enumerate() {
+        let estimate = |layer: usize| trace.estimates.iter().find(|e| e.layer == layer);
+        let Some(e) = estimate(detection.layer) else { continue };
+        // A layer that ruptures before its far face: the tip is free until the next one begins.
+        let next_m = trace.detections.get(k + 1).and_then(|next| Some(estimate(next.layer)?.start_m));
+        let gap_m = next_m.filter(|next_m| *next_m > detection.located_m + MIN_THICKNESS_M);
+        let puncture_n = gap_m.map(|_| rounded(e.stiffness_n_per_m * (detection.located_m - front_m)));
+        let back_m = gap_m.unwrap_or(detection.located_m);
+        layers.push(layer(layers.len(), back_m - front_m, e.stiffness_n_per_m, e.friction, puncture_n));
         front_m = back_m;
-    };
-    for detection in &trace.detections {
-        let Some(e) = trace.estimates.iter().find(|e| e.layer == detection.layer) else { continue };
-        push(&mut layers, detection.located_m, e.stiffness_n_per_m, e.friction);
     }
     let last = |column: &[f64]| column.iter().take(deepest + 1).rev().copied().find(|v| v.is_finite());
     let end_m = recording.position_m[deepest];
     let beyond_m = (BEYOND.0 * (end_m - surface_m)).max(BEYOND.1);
-    push(
-        &mut layers,
-        end_m + beyond_m,
-        last(&trace.stiffness_n_per_m).unwrap_or(0.0),
-        last(&trace.friction).unwrap_or(0.0),
-    );
+    let [stiffness, friction] = [&trace.stiffness_n_per_m, &trace.friction].map(|c| last(c).unwrap_or(0.0));
+    layers.push(layer(layers.len(), end_m + beyond_m - front_m, stiffness, friction, None));
     let start_m = recording.position_m.first().copied().unwrap_or(0.0);
     let duration_s = recording.time_s[deepest] - recording.time_s[0];
     let speed_mps = if duration_s > 0.0 { rounded((end_m - start_m) / duration_s) } else { SPEED_MPS };
@@ -354,8 +363,11 @@ fn from_recording(studio: &mut Studio, file: &str, algorithm: &str) -> Result<Sc
     scenario.name = file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned();
     scenario.source = format!("layers found by stylet studio in {file}");
     scenario.tissue = stylet_tissue::Tissue { surface_m: rounded(surface_m), layers };
-    scenario.motion =
-        Motion::Constant { start_m: rounded(start_m), velocity_mps: speed_mps, duration_s: rounded(duration_s) };
+    scenario.motion = Motion::Constant {
+        start_m: rounded(start_m),
+        velocity_mps: speed_mps,
+        duration_s: rounded(duration_s),
+    };
     Ok(scenario)
 }
 
@@ -382,7 +394,12 @@ pub fn run(studio: &mut Studio) -> Result<RunResultView, Problem> {
     studio.workspace.record(commands::run(&file, &folder, &output))?;
     let first = run.algorithm_runs.first().and_then(|r| r.score.as_ref());
     let found = first.map_or(String::new(), |s| {
-        format!("{} of {} ruptures found, {} false", s.ruptures.len() - s.missed, s.ruptures.len(), s.false_alarms)
+        format!(
+            "{} of {} ruptures found, {} false",
+            s.ruptures.len() - s.missed,
+            s.ruptures.len(),
+            s.false_alarms
+        )
     });
     Ok(RunResultView { summary: found, folder: "simulation".to_owned() })
 }

@@ -54,8 +54,8 @@ fn along_own_motion(mut scenario: Scenario) -> Result<PreviewView, Problem> {
 
 fn along_recording(scenario: &Scenario, recording: &Recording, file: &str) -> Result<PreviewView, Problem> {
     let predicted = force_along_motion(scenario, recording).map_err(|why| Problem::new(why.to_string()))?;
-    let law = ForceLaw::new(&scenario.tissue, &scenario.effects)
-        .map_err(|why| Problem::new(why.to_string()))?;
+    let law =
+        ForceLaw::new(&scenario.tissue, &scenario.effects).map_err(|why| Problem::new(why.to_string()))?;
     let mut ruptures = Vec::new();
     let mut tip_n = Vec::with_capacity(recording.len());
     let motion = recording.samples().map(|s| (s.time_s, s.position_m, s.velocity_mps));

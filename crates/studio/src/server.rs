@@ -86,8 +86,10 @@ impl Server {
             studio: Mutex::new(studio),
             uploads: tempfile::Builder::new().prefix("stylet-studio-").tempdir()?,
         });
-        let runtime =
-            tokio::runtime::Builder::new_current_thread().enable_all().max_blocking_threads(WORKERS).build()?;
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .max_blocking_threads(WORKERS)
+            .build()?;
         let stop = Arc::new(Notify::new());
         let stopped = stop.clone();
         let thread = std::thread::Builder::new().name("stylet-studio".to_owned()).spawn(move || {
@@ -118,7 +120,9 @@ impl Server {
             #[cfg(unix)]
             {
                 let ended = Arc::new(Notify::new());
-                for kind in [tokio::signal::unix::SignalKind::terminate(), tokio::signal::unix::SignalKind::hangup()] {
+                for kind in
+                    [tokio::signal::unix::SignalKind::terminate(), tokio::signal::unix::SignalKind::hangup()]
+                {
                     let mut signal = tokio::signal::unix::signal(kind)?;
                     let ended = ended.clone();
                     tokio::spawn(async move {
@@ -213,9 +217,8 @@ async fn guard(State(shared): State<Arc<Shared>>, request: Request, next: Next) 
 }
 
 fn refusal(shared: &Shared, headers: &HeaderMap, path: &str) -> Option<&'static str> {
-    let own = |text: &str| {
-        ["127.0.0.1", "localhost"].iter().any(|host| *text == format!("{host}:{}", shared.port))
-    };
+    let own =
+        |text: &str| ["127.0.0.1", "localhost"].iter().any(|host| *text == format!("{host}:{}", shared.port));
     let text = |name: HeaderName| headers.get(name).map(|value| value.to_str().unwrap_or_default());
     if !text(header::HOST).is_some_and(own) {
         return Some("wrong Host: open the address that `stylet studio` printed");

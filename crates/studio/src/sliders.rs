@@ -113,7 +113,10 @@ impl Scale {
                     "" if self.optional => Ok(None),
                     "∞" => Ok(Some(f64::INFINITY)),
                     _ => text.parse::<f64>().map(|value| Some(value / self.factor)).map_err(|_| {
-                        Problem::new(format!("{text:?} is no number; write one such as 12.5, in {}", self.unit))
+                        Problem::new(format!(
+                            "{text:?} is no number; write one such as 12.5, in {}",
+                            self.unit
+                        ))
                     }),
                 }
             }

@@ -10,7 +10,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use stylet_api::{AlgorithmRun, ColumnMap, ReadOptions, Recording, Scenario};
+use stylet_api::{AlgorithmRun, ColumnMap, NamedRecording, ReadOptions, Recording, Scenario};
 use stylet_record::QualityNote;
 
 /// Steps that can be undone.
@@ -41,7 +41,7 @@ pub struct Studio {
     stroke: Option<u64>,
     loaded: Vec<(String, Arc<Loaded>)>,
     /// Outputs of the online algorithm for the recording shown last.
-    pub(crate) enhanced: Vec<(String, String, Arc<AlgorithmRun>)>,
+    pub(crate) enhanced: Vec<(String, Arc<AlgorithmRun>)>,
     pub(crate) job: Option<Job>,
     pub(crate) explained: Explained,
 }
@@ -171,8 +171,10 @@ impl Studio {
     fn edit(&mut self, request: EditRequest) -> Result<EditView, Problem> {
         let changed = phantom::edited(self, &request.edit)?;
         let same_stroke = request.stroke.is_some() && request.stroke == self.stroke;
-        self.change(Snapshot { phantom: changed, map: self.now.map.clone() }, !same_stroke, !request.transient)?;
-        self.stroke = request.stroke;
+        let moved = changed != self.now.phantom;
+        let stroke = if moved || same_stroke { request.stroke } else { None };
+        self.change(Snapshot { phantom: changed, ..self.now.clone() }, !same_stroke, !request.transient)?;
+        self.stroke = stroke;
         self.edit_view(request.along.as_deref())
     }
 
@@ -216,7 +218,8 @@ impl Studio {
     }
 
     fn step_back(&mut self, back: bool) -> Result<StateView, Problem> {
-        let (from, to) = if back { (&mut self.undo, &mut self.redo) } else { (&mut self.redo, &mut self.undo) };
+        let (from, to) =
+            if back { (&mut self.undo, &mut self.redo) } else { (&mut self.redo, &mut self.undo) };
         if let Some(snapshot) = from.pop() {
             to.push(self.now.clone());
             self.set(snapshot, true)?;
@@ -244,9 +247,11 @@ impl Studio {
         if let Some((_, loaded)) = self.loaded.iter().find(|(name, _)| name == file) {
             return Ok(loaded.clone());
         }
-        let (recording, notes) =
-            stylet_record::read_csv_skip_nonfinite(&self.workspace.data(file)?, &self.read_options())
-                .map_err(|why| Problem::new(why.to_string()))?;
+        let read = stylet_api::read_recordings(&[self.workspace.data(file)?], &self.read_options())
+            .map_err(|why| Problem::new(why.to_string()))?;
+        let Some(NamedRecording { recording, notes, .. }) = read.into_iter().next() else {
+            return Err(Problem::new("internal error: nothing was read; please report it"));
+        };
         let loaded = Arc::new(Loaded { recording, notes });
         if self.loaded.len() >= MAX_LOADED {
             self.loaded.remove(0);

@@ -47,7 +47,9 @@ impl Workspace {
             Err(_) => Journal::default(),
         };
         // Names in a file are not to be trusted.
-        journal.files.retain(|name| file_name(name).as_ref() == Some(name) && root.join("data").join(name).is_file());
+        journal
+            .files
+            .retain(|name| file_name(name).as_ref() == Some(name) && root.join("data").join(name).is_file());
         Ok(Self { root: root.to_owned(), journal })
     }
 
@@ -104,9 +106,12 @@ impl Workspace {
     /// # Errors
     /// When the name is unusable, or the file cannot be stored.
     pub fn add(&mut self, name: &str, from: &Path) -> Result<String, Problem> {
-        let name = file_name(name).ok_or_else(|| Problem::new("the file needs a name; rename it and drop it again"))?;
+        let name = file_name(name)
+            .ok_or_else(|| Problem::new("the file needs a name; rename it and drop it again"))?;
         if self.journal.files.len() >= MAX_FILES && !self.journal.files.contains(&name) {
-            return Err(Problem::new(format!("a workspace holds at most {MAX_FILES} recordings; remove one first")));
+            return Err(Problem::new(format!(
+                "a workspace holds at most {MAX_FILES} recordings; remove one first"
+            )));
         }
         let to = self.root.join("data").join(&name);
         let folder = self.root.join("data");
@@ -166,7 +171,10 @@ impl Workspace {
 }
 
 fn cannot_write(path: &Path, why: &std::io::Error) -> Problem {
-    Problem::new(format!("{}: cannot be written: {why}; free space, or start with another --out", path.display()))
+    Problem::new(format!(
+        "{}: cannot be written: {why}; free space, or start with another --out",
+        path.display()
+    ))
 }
 
 /// The last part of a path as a safe file name: letters, digits, `.`, `-`, `_`, not hidden; `None` when nothing is left.

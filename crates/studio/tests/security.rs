@@ -16,7 +16,8 @@ struct Running {
 
 impl Running {
     fn start(name: &str) -> Self {
-        let folder = std::env::temp_dir().join(format!("stylet-studio-security-{name}-{}", std::process::id()));
+        let folder =
+            std::env::temp_dir().join(format!("stylet-studio-security-{name}-{}", std::process::id()));
         let _ = std::fs::remove_dir_all(&folder);
         let studio = Studio::open(&folder, &[] as &[PathBuf]).expect("a new workspace");
         let server = Server::start(studio, 0).expect("a server");
@@ -34,7 +35,8 @@ impl Running {
     fn send(&self, head: &str, headers: &[&str], body: &[u8]) -> (u16, String) {
         let mut stream = TcpStream::connect(&self.host).expect("a connection");
         let host = format!("Host: {}", self.host);
-        let own_host = if headers.iter().any(|h| h.starts_with("Host:")) { None } else { Some(host.as_str()) };
+        let own_host =
+            if headers.iter().any(|h| h.starts_with("Host:")) { None } else { Some(host.as_str()) };
         let mut text = format!("{head} HTTP/1.1\r\nConnection: close\r\n");
         for line in own_host.iter().chain(headers) {
             text += &format!("{line}\r\n");
@@ -72,7 +74,8 @@ impl Drop for Running {
     }
 }
 
-const RECORDING: &[u8] = b"time_s,position_m,force_n\n0.00,0.000,0.0\n0.01,0.002,0.1\n0.02,0.004,0.2\n0.03,0.006,0.3\n";
+const RECORDING: &[u8] =
+    b"time_s,position_m,force_n\n0.00,0.000,0.0\n0.01,0.002,0.1\n0.02,0.004,0.2\n0.03,0.006,0.3\n";
 
 #[test]
 fn a_foreign_host_origin_or_token_is_refused() {
@@ -108,9 +111,14 @@ fn the_page_may_load_nothing_but_its_own_files() {
     let running = Running::start("policy");
     let (_, answer) = running.page();
     let head = answer.split("\r\n\r\n").next().unwrap_or_default().to_lowercase();
-    for needed in
-        ["default-src 'none'", "script-src 'self'", "connect-src 'self'", "nosniff", "no-referrer", "no-store"]
-    {
+    for needed in [
+        "default-src 'none'",
+        "script-src 'self'",
+        "connect-src 'self'",
+        "nosniff",
+        "no-referrer",
+        "no-store",
+    ] {
         assert!(head.contains(needed), "{needed} in {head}");
     }
     assert!(!head.contains("unsafe"), "{head}");
@@ -204,10 +212,22 @@ fn messages_that_are_not_understood_are_answered_with_a_reason() {
         ("nothing", "{}", "no message"),
         ("edit", "{", "invalid"),
         ("edit", r#"{"edit":{"kind":"face","face":99,"depth_mm":1.0}}"#, "no such face"),
-        ("edit", r#"{"edit":{"kind":"layer","layer":0,"field":"stiffness","to":{"text":"much"}}}"#, "is no number"),
-        ("edit", r#"{"edit":{"kind":"layer","layer":0,"field":"stiffness","to":{"text":"-5"}}}"#, "stiffness"),
+        (
+            "edit",
+            r#"{"edit":{"kind":"layer","layer":0,"field":"stiffness","to":{"text":"much"}}}"#,
+            "is no number",
+        ),
+        (
+            "edit",
+            r#"{"edit":{"kind":"layer","layer":0,"field":"stiffness","to":{"text":"-5"}}}"#,
+            "stiffness",
+        ),
         ("edit", r#"{"edit":{"kind":"ron","text":"Scenario(nam: 1)"}}"#, "phantom.ron"),
-        ("plan", r#"{"files":[],"limits":{"depth_mm":1e400,"speed_mm_per_s":1,"acceleration_mm_per_s2":1,"duration_s":1,"force_n":1}}"#, "invalid"),
+        (
+            "plan",
+            r#"{"files":[],"limits":{"depth_mm":1e400,"speed_mm_per_s":1,"acceleration_mm_per_s2":1,"duration_s":1,"force_n":1}}"#,
+            "invalid",
+        ),
     ] {
         let (status, answer) = running.call(name, body);
         assert_eq!(status, 422, "{name} {body}");
