@@ -329,7 +329,8 @@ pub fn without_causes(studio: &mut Studio, request: CausesRequest) -> Result<Cau
     let loaded = studio.recording(&request.file)?;
     let measured_n = &loaded.recording.force_n;
     let assumed_n = force_along_motion(&studio.now.phantom, &loaded.recording).map_err(failed)?;
-    let mut forces = vec![("measured", "measured", measured_n.as_slice()), ("assumed", "phantom", &assumed_n)];
+    let mut forces =
+        vec![("measured", "measured", measured_n.as_slice()), ("assumed", "phantom", &assumed_n)];
     let mut summary = format!("error of the phantom {}", rms_text(measured_n, &assumed_n));
     let model_n = match &studio.explained.diagnosis {
         Some(diagnosed) => {

@@ -1,4 +1,4 @@
-//! What is in a file: columns, units, findings; corrections become the column map.
+//! What is in a file: columns, units, findings of `stylet inspect`; corrections become the column map.
 
 use crate::look::{findings, size_text};
 use crate::messages::*;
@@ -8,6 +8,9 @@ use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
 use stylet_api::ColumnMap;
 use stylet_record::Column;
+use stylet_record::inspect::{
+    Candidate, InspectOptions, InspectedColumn, Inspection, inspect as inspect_file,
+};
 use stylet_report::significant;
 
 /// Rows of a file that are looked at for the small plots.
@@ -16,6 +19,8 @@ const SKETCH_ROWS: u64 = 160;
 const ROW_BYTES: u64 = 4096;
 /// Columns that are shown.
 const MAX_COLUMNS: usize = 60;
+/// Relative difference below which a scale is that of a unit.
+const SAME_SCALE: f64 = 1e-9;
 
 /// A unit and its size in SI units.
 type Unit = (&'static str, f64);
@@ -26,12 +31,6 @@ const QUANTITIES: [(&str, &[Unit], bool); 4] = [
     ("velocity", &[("m/s", 1.0), ("mm/s", 1e-3)], false),
 ];
 
-pub fn map_ron(map: &ColumnMap) -> Result<String, Problem> {
-    let pretty = ron::ser::PrettyConfig::new().struct_names(true);
-    let text = stylet_scenario::ron_options().to_string_pretty(map, pretty);
-    text.map(|text| text + "\n").map_err(|why| Problem::new(why.to_string()))
-}
-
 fn column<'a>(map: &'a ColumnMap, quantity: &str) -> Option<&'a Column> {
     match quantity {
         "time" => Some(&map.time),
@@ -41,124 +40,158 @@ fn column<'a>(map: &'a ColumnMap, quantity: &str) -> Option<&'a Column> {
     }
 }
 
-/// SI units per unit of the file.
-fn scale(column: &Column) -> f64 {
-    serde_json::to_value(column).ok().and_then(|column| column["scale"].as_f64()).unwrap_or(1.0)
-}
-
 fn set(map: &mut ColumnMap, quantity: &str, column: Option<Column>) {
-    let required = |column: Option<Column>| column.unwrap_or_else(|| Column::si(""));
     match quantity {
-        "time" => map.time = required(column),
-        "position" => map.position = required(column),
-        "force" => map.force = required(column),
+        "time" => map.time = column.unwrap_or_default(),
+        "position" => map.position = column.unwrap_or_default(),
+        "force" => map.force = column.unwrap_or_default(),
         _ => map.velocity = column,
     }
 }
 
-/// Names of the columns and some values of each.
-struct Sample {
-    names: Vec<String>,
-    values: Vec<Vec<f32>>,
-}
-
-/// The header and evenly spaced rows of a text; empty for other files.
-fn sample(path: &Path) -> Option<Sample> {
+/// Some values of each column of a text, from evenly spaced rows; `None` for other files and for texts with other columns.
+fn sketches(path: &Path, columns: usize) -> Option<Vec<Vec<f32>>> {
     let mut file = File::open(path).ok()?;
     let size = file.metadata().ok()?.len();
     let mut piece = |from: u64| {
         let mut bytes = Vec::new();
         file.seek(SeekFrom::Start(from)).ok()?;
         file.by_ref().take(ROW_BYTES).read_to_end(&mut bytes).ok()?;
-        Some(String::from_utf8_lossy(&bytes).into_owned())
+        String::from_utf8(bytes).ok().or_else(|| Some(String::new()))
     };
-    let head = piece(0)?;
-    let header = head.trim_start_matches('\u{feff}').lines().find(|line| !line.trim().is_empty())?.to_owned();
-    let delimiter = [',', ';', '\t', '|'].into_iter().max_by_key(|d| header.matches(*d).count())?;
-    let cells = |line: &str| -> Vec<String> {
-        line.split(delimiter).map(|cell| cell.trim().trim_matches('"').trim().to_owned()).collect()
+    let cells = |row: &str, delimiter: char| {
+        row.split(delimiter).map(|c| c.trim().replace(',', ".")).collect::<Vec<_>>()
     };
-    let names: Vec<String> = cells(&header).into_iter().take(MAX_COLUMNS).collect();
-    if head.contains('\0') || names.len() < 2 {
-        return None;
-    }
-    let mut values = vec![Vec::new(); names.len()];
+    let mut values = vec![Vec::new(); columns];
     for k in 0..SKETCH_ROWS {
         // The first line of a piece is cut, or the header.
         let text = piece(k * size / SKETCH_ROWS)?;
         let Some(row) = text.lines().nth(1) else { continue };
-        let row = cells(row);
-        for (column, cell) in values.iter_mut().zip(row.iter().chain(std::iter::repeat(&String::new()))) {
-            column.push(cell.replace(',', ".").parse().unwrap_or(f32::NAN));
+        let split = [';', '\t', '|', ',', ' '].map(|d| cells(row, d));
+        let Some(row) = split.iter().find(|row| row.len() == columns) else { continue };
+        for (column, cell) in values.iter_mut().zip(row) {
+            column.push(cell.parse().unwrap_or(f32::NAN));
         }
     }
-    Some(Sample { names, values })
+    values.first().is_some_and(|column| column.len() > 1).then_some(values)
 }
 
 /// What is in a file, as the map says.
 pub fn inspect(studio: &mut Studio, file: &str) -> Result<InspectionView, Problem> {
-    let map = studio.now.map.clone().unwrap_or_default();
-    let sample = sample(&studio.workspace.data(file)?);
+    let path = studio.workspace.data(file)?;
+    let options = InspectOptions { columns: studio.now.map.clone() };
+    let found = inspect_file(&path, &options).map_err(|why| Problem::new(why.to_string()))?;
+    let map = studio.now.map.clone().unwrap_or_else(|| found.map.clone());
     let quantities = QUANTITIES.iter().map(|(name, units, required)| QuantityView {
         name,
         units: units.iter().map(|(unit, _)| *unit).collect(),
         required: *required,
     });
+    let remarks = found
+        .findings
+        .iter()
+        .map(|f| FindingView { level: if f.obstacle { "bad" } else { "warn" }, message: f.message.clone() });
     let mut view = InspectionView {
         file: file.to_owned(),
-        summary: String::new(),
-        columns: sample.map(|sample| columns(&map, sample)).unwrap_or_default(),
-        findings: Vec::new(),
+        summary: format!("{}, {} rows", found.format, found.rows),
+        columns: columns(&map, &found, &path),
+        findings: remarks.collect(),
         readable: true,
-        map: map_ron(&map)?,
+        map: map.to_ron(),
         quantities: quantities.collect(),
     };
     match studio.recording(file) {
         Ok(loaded) => {
-            view.summary = size_text(&loaded.recording);
-            view.findings = findings(&loaded.notes);
+            view.summary = format!("{}, {}", found.format, size_text(&loaded.recording));
+            view.findings.retain(|f| f.level != "bad");
+            view.findings.extend(findings(&loaded.notes));
+            view.findings.dedup_by(|a, b| a.message == b.message);
         }
         Err(problem) => {
             view.readable = false;
-            view.findings.push(FindingView { level: "bad", message: problem.error });
+            if view.findings.iter().all(|f| f.level != "bad") {
+                view.findings.insert(0, FindingView { level: "bad", message: problem.error });
+            }
         }
     }
     Ok(view)
 }
 
-fn columns(map: &ColumnMap, sample: Sample) -> Vec<ColumnView> {
-    let view = |(name, sketch): (String, Vec<f32>)| {
+/// The column of a map that a column of the file is.
+fn is_column(mapped: &Column, candidate: Option<&Candidate>, number: usize, name: &str) -> bool {
+    match mapped.is_open() {
+        true => candidate.is_some_and(|c| c.columns.contains(&number)),
+        false => {
+            mapped.column == Some(number)
+                || mapped.columns.contains(&number)
+                || mapped.name == name
+                || mapped.names.iter().any(|n| n == name)
+        }
+    }
+}
+
+fn columns(map: &ColumnMap, found: &Inspection, path: &Path) -> Vec<ColumnView> {
+    let sketches = sketches(path, found.columns.len());
+    let view = |c: &InspectedColumn| {
+        let candidate = |quantity: &str| found.candidates.iter().find(|k| k.role.name() == quantity);
         let used = QUANTITIES.iter().find_map(|(quantity, units, _)| {
-            let column = column(map, quantity).filter(|c| c.name == name)?;
-            Some((*quantity, *units, column))
+            let candidate = candidate(quantity);
+            let mapped = column(map, quantity).filter(|m| is_column(m, candidate, c.number, &c.name))?;
+            Some((*quantity, *units, mapped.scale.or(candidate.map(|k| k.scale)).unwrap_or(1.0), candidate))
         });
-        let finite = sketch.iter().copied().filter(|v| v.is_finite()).map(f64::from);
-        let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+        let unit = used.map(|(_, units, scale, _)| {
+            let same = |size: f64| (size - scale.abs()).abs() < SAME_SCALE * size;
+            let known = units.iter().find(|(_, size)| same(*size));
+            known.map_or(format!("× {}", significant(scale.abs(), 4)), |(unit, _)| (*unit).to_owned())
+        });
+        let sketch = sketches.as_ref().and_then(|s| s.get(c.number - 1)).cloned().unwrap_or_default();
         ColumnView {
-            quantity: used.map_or("", |(quantity, _, _)| quantity),
-            unit: used.map_or(String::new(), |(_, units, column)| {
-                let known = units.iter().find(|(_, size)| *size == scale(column).abs());
-                known.map_or(format!("× {}", scale(column).abs()), |(unit, _)| (*unit).to_owned())
+            name: c.name.clone(),
+            quantity: used.map_or("", |(quantity, ..)| quantity),
+            unit: unit.or_else(|| c.unit.clone()).unwrap_or_default(),
+            flipped: used.is_some_and(|(_, _, scale, _)| scale < 0.0),
+            reason: used.and_then(|(.., candidate)| candidate).map_or(String::new(), |k| k.reason.clone()),
+            range: c.range.map_or(String::new(), |(low, high)| {
+                format!("{} to {}", significant(low, 4), significant(high, 4))
             }),
-            flipped: used.is_some_and(|(_, _, column)| scale(column) < 0.0),
-            reason: String::new(),
-            range: format!("{} to {}", significant(low, 4), significant(high, 4)),
-            name,
             sketch,
         }
     };
-    sample.names.into_iter().zip(sample.values).map(view).collect()
+    found.columns.iter().take(MAX_COLUMNS).map(view).collect()
+}
+
+/// Adopts the proposed map for a file that cannot be read without one, so that only wrong guesses need a click.
+pub fn adopt_proposal(studio: &mut Studio, file: &str) -> Result<(), Problem> {
+    if studio.now.map.is_none()
+        && let Ok(found) = inspect_file(studio.workspace.data(file)?, &InspectOptions::default())
+        && found.map_needed
+        && found.map.check().is_ok()
+    {
+        studio.change(Snapshot { map: Some(found.map), ..studio.now.clone() }, true, true)?;
+    }
+    Ok(())
 }
 
 /// Takes a correction into the map.
 pub fn set_column(studio: &mut Studio, request: ColumnRequest) -> Result<InspectionView, Problem> {
-    let mut map = studio.now.map.clone().unwrap_or_default();
+    let options = InspectOptions { columns: studio.now.map.clone() };
+    let found = inspect_file(studio.workspace.data(&request.file)?, &options);
+    let found = found.map_err(|why| Problem::new(why.to_string()))?;
+    let gone = || Problem::new(format!("the file has no column {:?}", request.column));
+    let number = found.columns.iter().find(|c| c.name == request.column).ok_or_else(gone)?.number;
+    let named = found.text.as_ref().is_none_or(|text| text.names_line.is_some());
+    let mut map = studio.now.map.clone().unwrap_or_else(|| found.map.clone());
     for (quantity, units, _) in QUANTITIES {
+        let candidate = found.candidates.iter().find(|k| k.role.name() == quantity);
         if quantity == request.quantity {
             let size = units.iter().find(|(unit, _)| *unit == request.unit).map_or(1.0, |(_, size)| *size);
-            let scale = if request.flipped { -size } else { size };
-            set(&mut map, quantity, Some(Column::scaled(request.column.clone(), scale)));
-        } else if column(&map, quantity).is_some_and(|c| c.name == request.column) {
+            let scale = Some(if request.flipped { -size } else { size });
+            let chosen = match named {
+                true => Column { name: request.column.clone(), scale, ..Column::default() },
+                false => Column { column: Some(number), scale, ..Column::default() },
+            };
+            set(&mut map, quantity, Some(chosen));
+        } else if column(&map, quantity).is_some_and(|m| is_column(m, candidate, number, &request.column)) {
             set(&mut map, quantity, None);
         }
     }
@@ -166,7 +199,7 @@ pub fn set_column(studio: &mut Studio, request: ColumnRequest) -> Result<Inspect
     inspect(studio, &request.file)
 }
 
-/// Goes back to Stylet's own names and units.
+/// Goes back to what is found without a map.
 pub fn forget_map(studio: &mut Studio) -> Result<StateView, Problem> {
     studio.change(Snapshot { map: None, ..studio.now.clone() }, true, true)?;
     studio.state()

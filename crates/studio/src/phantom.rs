@@ -328,7 +328,12 @@ fn layer(index: usize, thickness_m: f64, stiffness: f64, friction: f64, puncture
 }
 
 /// Layers from the online algorithm's estimates: faces where ruptures were located, the last layer to below the deepest point.
-fn from_recording(studio: &mut Studio, file: &str, algorithm: &str, contact_mm: Option<f64>) -> Result<Scenario, Problem> {
+fn from_recording(
+    studio: &mut Studio,
+    file: &str,
+    algorithm: &str,
+    contact_mm: Option<f64>,
+) -> Result<Scenario, Problem> {
     let loaded = studio.recording(file)?;
     let run = look::run_algorithm(studio, file, algorithm, contact_mm)?;
     let (recording, trace) = (&loaded.recording, &run.trace);

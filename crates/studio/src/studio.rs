@@ -139,6 +139,7 @@ impl Studio {
     pub fn add_file(&mut self, name: &str, from: &Path) -> Result<Vec<u8>, Problem> {
         let name = self.workspace.add(name, from)?;
         self.forget_recordings();
+        open::adopt_proposal(self, &name)?;
         json(&open::inspect(self, &name)?)
     }
 
@@ -155,7 +156,7 @@ impl Studio {
             version: env!("CARGO_PKG_VERSION"),
             folder: self.workspace.root().display().to_string(),
             files: self.workspace.files().to_vec(),
-            map: self.now.map.as_ref().map(open::map_ron).transpose()?,
+            map: self.now.map.as_ref().map(ColumnMap::to_ron),
             phantom: phantom::view(&self.now.phantom)?,
             commands: self.workspace.commands().to_vec(),
             undo: self.undo.len(),
@@ -211,7 +212,7 @@ impl Studio {
     pub(crate) fn keep(&self) -> Result<(), Problem> {
         self.workspace.write(PHANTOM, phantom::ron(&self.now.phantom)?.as_bytes())?;
         match &self.now.map {
-            Some(map) => self.workspace.write(MAP, open::map_ron(map)?.as_bytes()),
+            Some(map) => self.workspace.write(MAP, map.to_ron().as_bytes()),
             // There may be none.
             None => Ok(drop(std::fs::remove_file(self.workspace.path(MAP)))),
         }
