@@ -301,5 +301,8 @@ fn cause(search: &Search, effect: &AnyEffect, half_widths: &[f64], removed: impl
             .collect(),
         gain_nats,
         share: 0.0,
+        at_bound: Vec::new(),
+        general_forms: Vec::new(),
+        remark: None,
     }
 }
