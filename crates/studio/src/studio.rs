@@ -213,8 +213,11 @@ impl Studio {
         self.workspace.write(PHANTOM, phantom::ron(&self.now.phantom)?.as_bytes())?;
         match &self.now.map {
             Some(map) => self.workspace.write(MAP, map.to_ron().as_bytes()),
-            // There may be none.
-            None => Ok(drop(std::fs::remove_file(self.workspace.path(MAP)))),
+            None => {
+                // There may be none.
+                let _ = std::fs::remove_file(self.workspace.path(MAP));
+                Ok(())
+            }
         }
     }
 
