@@ -183,12 +183,17 @@ impl Table {
         for (column, parts) in mapped.columns.iter().zip(&mut parts) {
             let origin = read.origins.get(place).copied().flatten();
             place += column.indices.len();
+            // Counted from the first whole second, as dates from the first one.
+            let whole_s = parts.first().and_then(|p| p.first()).copied().filter(|x| x.is_finite());
             let mut raw_values = combine(column, std::mem::take(parts), axis);
             raw_values.resize(rows, f64::NAN);
             if column.role == ColumnRole::Time {
-                base_s = origin.map_or(0.0, |x| {
-                    if column.kind == ColumnKind::Date { x as f64 / 1e9 } else { x as f64 * column.scale }
-                });
+                base_s = match (column.parts, origin) {
+                    (Parts::SecondsNanoseconds, _) => whole_s.unwrap_or(0.0),
+                    (_, Some(x)) if column.kind == ColumnKind::Date => x as f64 / 1e9,
+                    (_, Some(x)) => x as f64 * column.scale,
+                    (_, None) => 0.0,
+                };
                 time =
                     Some(seconds(file, column, raw_values, (&offsets, origin), map.and_then(|m| m.rate_hz))?);
                 continue;

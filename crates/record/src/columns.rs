@@ -171,9 +171,10 @@ pub(crate) fn map_series(
 ) -> Result<MappedColumns, RecordError> {
     let mut found = MappedColumns::default();
     if map.rate_hz.is_none() || !map.time.is_open() {
-        // The other file may name its time otherwise.
+        // The other file may name its time otherwise, and numbers of columns are those of the first file.
+        let by_number = map.time.column.is_some() || !map.time.columns.is_empty();
         let time = match given(head, ColumnRole::Time, &map.time) {
-            Ok(Some(time)) => time,
+            Ok(Some(time)) if !by_number => time,
             _ => open(head, ColumnRole::Time, &[])?,
         };
         found.add(head, time);
@@ -387,6 +388,13 @@ fn open(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Result<Mapped
     let column = Column::default();
     if let Some(index) = place(head, own)? {
         return Ok(mapped(head, role, vec![index], &Column { scale: Some(1.0), ..column }).named_only());
+    }
+    // Seconds and nanoseconds, as `ros2 topic echo --csv` prints them.
+    let stamp = |part: &str| head.names.iter().position(|name| name == part);
+    if let (ColumnRole::Time, Some(s), Some(ns)) =
+        (role, stamp("header.stamp.sec"), stamp("header.stamp.nanosec"))
+    {
+        return Ok(mapped(head, role, vec![s, ns], &column));
     }
     let found = unmistakable(head, role, taken);
     match found.as_slice() {

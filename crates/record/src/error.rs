@@ -226,8 +226,11 @@ pub enum RecordError {
     TooShort { samples: usize },
 
     /// Recordings with blocking quality notes.
-    #[error("{}{}", unusable(*of, wrong.len()), wrong.join("\n"))]
-    Unusable { of: usize, wrong: Vec<String> },
+    #[error(
+        "{}{}\nlook at a file with: stylet inspect FILE --write-map map.ron",
+        unusable(*of, *recordings), wrong.join("\n")
+    )]
+    Unusable { of: usize, recordings: usize, wrong: Vec<String> },
 
     /// The same recording under several names.
     #[error(

@@ -90,14 +90,19 @@ pub(crate) fn assess_stream<A: SampleStream>(recording: &A) -> Result<Vec<Qualit
 pub fn check_usable<'a>(
     recordings: impl IntoIterator<Item = (&'a str, &'a [QualityNote])>,
 ) -> Result<(), RecordError> {
-    let (mut of, mut refused) = (0, Vec::new());
+    let (mut of, mut wrong, mut refused) = (0, 0, Vec::new());
     for (name, notes) in recordings {
         of += 1;
-        if let Some(note) = notes.iter().find(|note| note.blocking) {
-            refused.push(format!("{name}: {}", note.message));
-        }
+        refused.extend(
+            notes.iter().filter(|note| note.blocking).map(|note| format!("{name}: {}", note.message)),
+        );
+        wrong += usize::from(notes.iter().any(|note| note.blocking));
     }
-    if refused.is_empty() { Ok(()) } else { Err(RecordError::Unusable { of, wrong: refused }) }
+    if refused.is_empty() {
+        Ok(())
+    } else {
+        Err(RecordError::Unusable { of, recordings: wrong, wrong: refused })
+    }
 }
 
 #[cfg(test)]

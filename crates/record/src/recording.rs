@@ -171,6 +171,11 @@ impl Recording {
         stylet_stats::median_of(self.time_s.windows(2).map(|pair| pair[1] - pair[0]))
     }
 
+    /// Mean sampling rate (Hz): intervals per duration. `NaN` with fewer than two samples.
+    pub fn mean_hz(&self) -> f64 {
+        if self.len() < 2 { f64::NAN } else { (self.len() - 1) as f64 / self.duration_s() }
+    }
+
     /// Typical sampling rate (Hz): the inverse of the median interval. `NaN` with fewer than two samples.
     pub fn sample_hz(&self) -> f64 {
         1.0 / self.median_interval_s()

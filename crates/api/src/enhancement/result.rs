@@ -106,7 +106,7 @@ pub fn enhance_recording(
     let extent = RecordingExtent {
         samples: recording.len(),
         duration_s: recording.duration_s(),
-        sample_hz: recording.sample_hz(),
+        sample_hz: recording.mean_hz(),
     };
     let model = model.map(|model| AppliedModel::new(model, &runs));
     let table = EnhancedTable::InMemory(csv);

@@ -51,7 +51,12 @@ fn damaged(why: impl std::fmt::Display) -> String {
 fn text_attribute(dataset: &Dataset, names: &[&str]) -> Option<String> {
     let attributes = dataset.attrs().ok()?;
     names.iter().find_map(|name| match attributes.get(*name) {
-        Some(AttrValue::String(text) | AttrValue::AsciiString(text)) => Some(text.clone()),
+        Some(
+            AttrValue::String(text)
+            | AttrValue::AsciiString(text)
+            | AttrValue::VarLenString(text)
+            | AttrValue::VarLenAsciiString(text),
+        ) => Some(text.clone()),
         _ => None,
     })
 }

@@ -20,6 +20,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 #[cfg(feature = "formats")]
+mod compound_file;
+#[cfg(feature = "formats")]
 mod export;
 #[cfg(feature = "formats")]
 mod hdf5;

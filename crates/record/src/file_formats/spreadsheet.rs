@@ -9,6 +9,9 @@ const MAX_CELLS: usize = 200_000_000;
 
 /// A sheet as text, one line per row, columns separated by tabs. Without a name the sheet with most numbers is taken.
 pub(super) fn to_text(bytes: &[u8], sheet: Option<&str>) -> Result<Vec<u8>, String> {
+    if !bytes.starts_with(b"PK") && !super::compound_file::is_sound(bytes) {
+        return Err("it is damaged: a chain of its sectors does not end".to_owned());
+    }
     let mut book = open_workbook_auto_from_rs(Cursor::new(bytes))
         .map_err(|e| format!("it cannot be read ({e}); save it as xlsx, ods or CSV"))?;
     let names = book.sheet_names();

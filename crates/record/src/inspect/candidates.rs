@@ -13,6 +13,8 @@ use crate::units::{Dimension, quantity_of, split_name};
 
 /// Share of the variance that one of three components must hold to stand for all.
 const MAIN_COMPONENT_SHARE: f64 = 0.99;
+/// Consecutive integers from which on a time is a sample number.
+const MIN_SAMPLE_NUMBERS: f64 = 99.0;
 /// First seconds of a clock since 1970: 1973 to 2128.
 const EPOCH_S: (f64, f64) = (1e8, 5e9);
 
@@ -22,11 +24,12 @@ pub(super) struct Chosen {
     pub map: ColumnMap,
     pub map_needed: bool,
     /// What the readers would refuse about the columns.
-    pub errors: Vec<RecordError>,
+    pub errors: Vec<(Role, RecordError)>,
     time: Option<Source>,
     position: Option<Source>,
     force: Option<Source>,
     rate_hz: Option<f64>,
+    counts_samples: bool,
 }
 
 /// Where the values of a quantity come from.
@@ -152,6 +155,7 @@ pub(super) fn choose(head: TableHead<'_>, scan: &Scan, read: &RowsRead, map: Opt
         position: None,
         force: None,
         rate_hz,
+        counts_samples: false,
     };
     let mut taken: Vec<usize> = Vec::new();
     for role in ROLES {
@@ -167,7 +171,7 @@ pub(super) fn choose(head: TableHead<'_>, scan: &Scan, read: &RowsRead, map: Opt
             Ok(found) => (Some(found), true),
             Err(error) => {
                 let found = suggest(head, scan, role, &taken, column_role(role));
-                chosen.errors.push(error);
+                chosen.errors.push((role, error));
                 (found, false)
             }
         };
@@ -207,7 +211,14 @@ impl Chosen {
         let first_time = origin.map_or(column.first, |x| x as f64);
         let epoch = epoch_unit(first_time * found.scale)
             .filter(|_| role == Role::Time && found.kind == ColumnKind::Number);
-        if found.kind == ColumnKind::Date || found.parts == Parts::SecondsNanoseconds || found.scale_is_given
+        let steps = (column.values.max(1) - 1) as f64;
+        let counts = role == Role::Time && steps >= MIN_SAMPLE_NUMBERS && column.is_counter();
+        if counts && !found.scale_is_given {
+            reason = "it counts the samples: rate_hz, the samples per second, must be filled in".to_owned();
+            self.counts_samples = true;
+        } else if found.kind == ColumnKind::Date
+            || found.parts == Parts::SecondsNanoseconds
+            || found.scale_is_given
         {
         } else if let Some((unit, scale)) = epoch {
             found.scale = scale;
@@ -239,7 +250,7 @@ impl Chosen {
             _ => &mut self.map.force,
         };
         *slot = column_of_map;
-        if role == Role::Time && self.rate_hz.is_some() {
+        if role == Role::Time && (self.rate_hz.is_some() || self.counts_samples) {
             slot.scale = None;
         }
         let unit_name = match (kind, proposals.iter().find(|p| p.scale == found.scale), unit) {
@@ -255,7 +266,7 @@ impl Chosen {
             names: found.indices.iter().filter_map(|index| head.names.get(*index).cloned()).collect(),
             unit: unit_name,
             scale: found.scale,
-            certain: certain && proposals.is_empty(),
+            certain: certain && proposals.is_empty() && !(role == Role::Time && self.counts_samples),
             reason,
             proposals,
         });
@@ -391,7 +402,12 @@ fn time_columns(head: TableHead<'_>, scan: &Scan, free: &[usize]) -> Option<Vec<
 }
 
 fn signal_columns(head: TableHead<'_>, scan: &Scan, role: Role, free: &[usize]) -> Option<Vec<usize>> {
-    let moving: Vec<usize> = free.iter().copied().filter(|at| !scan.columns[*at].is_constant()).collect();
+    let moving: Vec<usize> = free
+        .iter()
+        .copied()
+        // A counter of messages or rows is no motion.
+        .filter(|at| !scan.columns[*at].is_constant() && !scan.columns[*at].is_counter())
+        .collect();
     let of_quantity = |at: &usize| {
         let by_unit = unit_of(head, *at).map(|unit| unit.dimension);
         by_unit == Some(role.dimension())

@@ -63,8 +63,19 @@ pub(super) fn findings(
 
 fn columns(found: &mut Findings<'_>, head: TableHead<'_>, chosen: &Chosen, facts: &FileFacts<'_>) {
     let mut said: Vec<String> = Vec::new();
-    for error in &chosen.errors {
-        let message = without_path(error, found.path);
+    for (role, error) in &chosen.errors {
+        let candidate = chosen.candidates.iter().find(|candidate| candidate.role == *role);
+        let message = match (error, candidate) {
+            // Said below.
+            (RecordError::MissingColumn { .. }, None) => continue,
+            (RecordError::MissingColumn { .. }, Some(candidate)) => format!(
+                "no column is the {} by name and unit; {} suggests \"{}\"",
+                role.name(),
+                candidate.reason,
+                candidate.names.join(", ")
+            ),
+            _ => without_path(error, found.path),
+        };
         if !said.contains(&message) {
             found.obstacle("columns", Some(head.line), message.clone());
             said.push(message);

@@ -30,11 +30,26 @@ const INTERVALS_S: (f64, f64) = (1e-5, 0.5);
 /// First times (s since 1970) of recordings: 1998 to 2128.
 const EPOCH_S: (f64, f64) = (9e8, 5e9);
 
-const LENGTHS: &[(&str, f64)] =
-    &[("m", 1.0), ("mm", 1e-3), ("inch", 0.0254), ("µm", 1e-6), ("cm", 1e-2), ("nm", 1e-9)];
-const FORCES: &[(&str, f64)] =
-    &[("N", 1.0), ("mN", 1e-3), ("gram-force", 1e-3 * STANDARD_GRAVITY), ("kN", 1e3), ("µN", 1e-6)];
-const TIMES: &[(&str, f64)] = &[("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9)];
+/// Units with SI units per unit and their rarity: factors by which the magnitude must fit better than in a usual unit, as
+/// logarithms.
+type Units = &'static [(&'static str, f64, f64)];
+
+const LENGTHS: Units = &[
+    ("m", 1.0, 0.0),
+    ("mm", 1e-3, 0.0),
+    ("inch", 0.0254, 1.0),
+    ("µm", 1e-6, 0.5),
+    ("cm", 1e-2, 1.5),
+    ("nm", 1e-9, 2.0),
+];
+const FORCES: Units = &[
+    ("N", 1.0, 0.0),
+    ("mN", 1e-3, 0.0),
+    ("gram-force", 1e-3 * STANDARD_GRAVITY, 1.0),
+    ("kN", 1e3, 0.5),
+    ("µN", 1e-6, 1.0),
+];
+const TIMES: Units = &[("s", 1.0, 0.0), ("ms", 1e-3, 0.0), ("µs", 1e-6, 0.0), ("ns", 1e-9, 0.0)];
 
 /// Units that would make a magnitude plausible, the most typical one first: of a length the travel, of a force the largest
 /// one, of a time the sampling interval.
@@ -46,17 +61,19 @@ pub fn propose_units(dimension: Dimension, magnitude: f64) -> Vec<UnitProposal> 
         Dimension::Time => (TIMES, INTERVALS_S, TYPICAL_INTERVAL_S),
         Dimension::Velocity | Dimension::Other => return Vec::new(),
     };
-    let mut found: Vec<UnitProposal> = units
+    let mut found: Vec<(f64, UnitProposal)> = units
         .iter()
-        .map(|(unit, scale)| UnitProposal {
-            unit: (*unit).to_owned(),
-            scale: *scale,
-            value: scale * magnitude,
+        .map(|(unit, scale, rarity)| {
+            let value = scale * magnitude;
+            (
+                rarity + (value / typical).ln().abs(),
+                UnitProposal { unit: (*unit).to_owned(), scale: *scale, value },
+            )
         })
-        .filter(|proposal| (low..=high).contains(&proposal.value))
+        .filter(|(_, proposal)| (low..=high).contains(&proposal.value))
         .collect();
-    found.sort_by(|a, b| (a.value / typical).ln().abs().total_cmp(&(b.value / typical).ln().abs()));
-    found
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.into_iter().map(|(_, proposal)| proposal).collect()
 }
 
 /// Whether a magnitude is implausible in SI units.
@@ -109,6 +126,8 @@ mod tests {
         assert_eq!(first(Dimension::Force, 3.0), "N");
         assert_eq!(first(Dimension::Length, 3.4), "inch");
         assert_eq!(first(Dimension::Length, 60.0), "mm");
+        assert_eq!(first(Dimension::Length, 24.0), "mm");
+        assert_eq!(first(Dimension::Length, 8.6), "cm");
         assert_eq!(first(Dimension::Length, 0.06), "m");
         assert_eq!(first(Dimension::Length, 86_000.0), "µm");
         assert_eq!(first(Dimension::Time, 5e6), "ns");

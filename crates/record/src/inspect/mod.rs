@@ -95,6 +95,10 @@ impl Inspection {
         for candidate in self.candidates.iter().filter(|candidate| !candidate.certain) {
             out.push_str(&format!("// {}: {}\n", candidate.role.name(), candidate.reason));
         }
+        if self.sampling.as_ref().is_none_or(|sampling| sampling.counts_samples) && self.map.rate_hz.is_none()
+        {
+            out.push_str("// rate_hz: the file has no time in seconds; fill in the samples per second as a line rate_hz: 200.0,\n");
+        }
         out + &self.map.to_ron()
     }
 }
@@ -275,6 +279,24 @@ pub fn inspect_bytes(bytes: &[u8], path: &Path, options: &InspectOptions) -> Res
 }
 
 impl RecordError {
+    /// Kind and line of the finding that says the same.
+    fn said(&self) -> Vec<(&'static str, Option<u64>)> {
+        match self {
+            Self::SampleNumber { line, .. } | Self::TimeUnit { line, .. } => {
+                // The finding stands at the names, the error at the first row.
+                (line.saturating_sub(3)..=*line).map(|line| ("time", Some(line))).collect()
+            }
+            Self::Bursts { line, .. }
+            | Self::SecondRun { line, .. }
+            | Self::BackwardTime { line, .. }
+            | Self::RepeatedTime { line, .. }
+            | Self::RepairTooMuch { line, .. } => vec![("sampling", Some(*line))],
+            Self::NotANumber { line, .. } => vec![("values", Some(*line))],
+            Self::RaggedRow { line, .. } | Self::OpenDecimal { line, .. } => vec![("layout", Some(*line))],
+            _ => Vec::new(),
+        }
+    }
+
     /// The error with all further obstacles, and the command that helps.
     pub(crate) fn with_obstacles(
         self,
@@ -298,7 +320,10 @@ impl RecordError {
         let first = self.to_string();
         let others = match inspect() {
             Ok(inspection) => {
-                let new = |finding: &&Finding| !first.contains(&finding.message);
+                let said = self.said();
+                let new = |finding: &&Finding| {
+                    !first.contains(&finding.message) && !said.contains(&(finding.kind, finding.line))
+                };
                 inspection.obstacles().filter(new).map(|finding| finding.message.clone()).collect()
             }
             Err(_) => Vec::new(),

@@ -64,6 +64,16 @@ impl ColumnScan {
         self.values == 0 || self.range() == 0.0
     }
 
+    /// Whether the values are consecutive integers.
+    pub(super) fn is_counter(&self) -> bool {
+        let steps = self.values.saturating_sub(1);
+        steps > 1
+            && self.up == steps
+            && self.range() == steps as f64
+            && self.first.fract() == 0.0
+            && self.bends == 0.0
+    }
+
     /// Whether the values increase like a clock: nearly always up, or level within bursts.
     pub(super) fn is_clock(&self) -> bool {
         let steps = (self.up + self.down + self.level).max(1) as f64;

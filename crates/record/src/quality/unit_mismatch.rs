@@ -3,7 +3,9 @@
 use super::extent::Extent;
 use super::note::{QualityKind, QualityNote};
 use crate::differentiate::{DEFAULT_HALF_WIDTH_S, SlopeFilter};
+use crate::inspect::magnitude::{in_words, propose_units};
 use crate::sample_stream::{Quantity, SampleStream};
+use crate::units::Dimension;
 use std::collections::VecDeque;
 use stylet_stats::quantiles_of_stream;
 
@@ -46,7 +48,8 @@ pub(super) fn unit_mix_ups<A: SampleStream>(
         MAX_RANGE_M,
         true,
         format!(
-            "the position ranges over {travel_m:.4} m: it looks like millimetres; give a column map with position scale 1e-3"
+            "the position ranges over {travel_m:.4} m; by that it may be in {}: give the scale in a column map, position: (..., scale: ...)",
+            in_words(&propose_units(Dimension::Length, travel_m), "m")
         ),
     );
     let speed_mps = typical(Quantity::Velocity)?;
@@ -55,17 +58,18 @@ pub(super) fn unit_mix_ups<A: SampleStream>(
         MAX_SPEED_MPS,
         true,
         format!(
-            "the needle moves at {speed_mps:.4} m/s: position or velocity look like millimetres: give a column map with scale 1e-3 \
-         (or the time is too short by its unit)"
+            "the needle moves at {speed_mps:.4} m/s: position, velocity or time have another unit than SI; give the scale in a column map"
         ),
     );
     let force_n = typical(Quantity::Force)?;
     note_above(
         force_n,
         MAX_FORCE_N,
-        true,
+        // Presses and bone biopsies reach such forces.
+        false,
         format!(
-            "the force reaches {force_n:.1} N: it looks like millinewtons; give a column map with force scale 1e-3"
+            "the force reaches {force_n:.1} N, which is much for a needle; by that it may be in {}: give the scale in a column map, force: (..., scale: ...)",
+            in_words(&propose_units(Dimension::Force, force_n), "N")
         ),
     );
     let interval_s = extent.median_interval_s;
@@ -165,11 +169,11 @@ mod tests {
     fn millimetres_millinewtons_and_milliseconds_are_reported() -> Result<(), RecordError> {
         let millimetres = messages(&insertion(1.0, 1e3, 1.0)?);
         assert!(
-            millimetres.contains("looks like millimetres") && millimetres.contains("m/s"),
+            millimetres.contains("may be in mm (scale 0.001") && millimetres.contains("m/s"),
             "{millimetres}"
         );
-        assert!(messages(&insertion(1.0, 1.0, -1e3)?).contains("looks like millinewtons"));
-        assert!(messages(&insertion(1e3, 1.0, 1.0)?).contains("looks like milliseconds"));
+        assert!(messages(&insertion(1.0, 1.0, -1e3)?).contains("mN (scale 0.001"));
+        assert!(messages(&insertion(1e3, 1.0, 1.0)?).contains("may be in ms (scale 0.001"));
         Ok(())
     }
 

@@ -209,7 +209,7 @@ fn is_comment(line: &str) -> bool {
 }
 
 fn without_comment_mark(line: &str) -> &str {
-    line.trim_start().trim_start_matches(['#', '%']).trim_start()
+    line.trim_start_matches(|c: char| matches!(c, '#' | '%') || c.is_whitespace())
 }
 
 /// Finds the layout of the table in the head of a text; `None` without rows of numbers.
@@ -369,6 +369,13 @@ fn header(all: &[Line<'_>], first: usize, block: &Block, hints: LayoutHints) -> 
 /// Fields of a line above the rows; a blank inside brackets does not separate names.
 fn header_fields(line: &str, block: &Block) -> Vec<String> {
     let fields = split(without_comment_mark(line), block.delimiter);
+    if is_comment(line) && data_width(&fields) != block.width {
+        // The names in a comment need not be separated like the numbers.
+        let others = DELIMITERS.iter().map(|delimiter| split(without_comment_mark(line), *delimiter));
+        if let Some(names) = others.into_iter().find(|names| names.len() == block.width) {
+            return names;
+        }
+    }
     if block.delimiter != Delimiter::Blanks || fields.len() <= block.width {
         return fields;
     }

@@ -68,16 +68,6 @@ const LARGE_DIGITS: usize = 16;
 /// Least rows before a last row that is cut short and left out.
 const MIN_ROWS_BEFORE_CUT: usize = 3;
 
-impl RowsRead {
-    fn add_ragged(&mut self, error: RecordError) {
-        let line = match &error {
-            RecordError::RaggedRow { line, .. } => *line,
-            _ => 1,
-        };
-        self.ragged.get_or_insert_with(|| (0, line, error.into())).0 += 1;
-    }
-}
-
 /// Records with one delimiter.
 enum Records<'a> {
     Csv(csv::Reader<Box<dyn Read + 'a>>),
@@ -153,7 +143,10 @@ pub(crate) fn read_rows(
     let mut row = csv::ByteRecord::new();
     let mut numbers = vec![0.0; wanted.len()];
     let mut read = RowsRead { origins: vec![None; wanted.len()], ..RowsRead::default() };
-    let mut short: Option<(usize, RecordError)> = None;
+    // Errors about lines that are passed over are made at the end: finding a line number reads the file from its beginning.
+    let mut short: Option<Ragged> = None;
+    let mut ragged: Option<(usize, Ragged)> = None;
+    let mut bad: Vec<(usize, usize, MissingValue)> = Vec::new();
     loop {
         let offset = layout.data_start + usize::try_from(records.offset()).unwrap_or(usize::MAX / 2);
         match records.read(&mut row, layout.comment) {
@@ -170,79 +163,86 @@ pub(crate) fn read_rows(
         if row.iter().all(|field| field.trim_ascii().is_empty()) {
             continue;
         }
-        if let Some((_, error)) = short.take() {
+        if let Some(short) = short.take() {
             match tolerance {
-                Tolerance::Strict => return Err(error),
-                Tolerance::Lenient => read.add_ragged(error),
+                Tolerance::Strict => return Err(short.error(file, layout)?),
+                Tolerance::Lenient => ragged.get_or_insert((0, short)).0 += 1,
             }
         }
         let empty_end =
             row.len() == width + 1 && row.get(width).is_some_and(|field| field.trim_ascii().is_empty());
         if row.len() != width && !empty_end {
-            if let (Tolerance::Lenient, Some(ragged)) = (tolerance, &mut read.ragged) {
-                ragged.0 += 1;
-                continue;
-            }
-            let error = RecordError::RaggedRow {
-                path: file.path(),
-                line: file.line_of_row(offset)?,
-                found: row.len(),
-                expected: width,
-                remedy: remedy_for_row(&row, layout),
-            };
+            let this = Ragged { offset, found: row.len(), remedy: remedy_for_row(&row, layout) };
             // The last row of an interrupted log may be cut short.
             let open_quote = row.iter().any(|field| field.contains(&b'\n') || field.contains(&b'\r'));
-            if row.len() > width || read.rows < MIN_ROWS_BEFORE_CUT || open_quote {
-                match tolerance {
-                    Tolerance::Strict => return Err(error),
-                    Tolerance::Lenient => read.add_ragged(error),
-                }
+            if row.len() < width && read.rows >= MIN_ROWS_BEFORE_CUT && !open_quote {
+                short = Some(this);
                 continue;
             }
-            short = Some((offset, error));
+            match tolerance {
+                Tolerance::Strict => return Err(this.error(file, layout)?),
+                Tolerance::Lenient => ragged.get_or_insert((0, this)).0 += 1,
+            }
             continue;
         }
         for (at, field) in wanted.iter().enumerate() {
             let bytes = row.get(field.index).unwrap_or_default();
+            let text = || String::from_utf8_lossy(bytes).trim().to_owned();
             numbers[at] = match value(layout, field, bytes, &mut read.origins[at]) {
                 Some(value) => value,
                 None if tolerance == Tolerance::Strict => {
-                    return Err(not_a_number(file, layout, offset, field, bytes)?);
+                    return Err(not_a_number(file, layout, offset, field, text())?);
                 }
                 None => {
-                    match read.bad_values.iter_mut().find(|bad| bad.field == at) {
-                        Some(bad) => bad.count += 1,
-                        None => {
-                            let first = not_a_number(file, layout, offset, field, bytes)?;
-                            let line = file.line_of_row(offset)?;
-                            read.bad_values.push(BadValues {
-                                field: at,
-                                count: 1,
-                                line,
-                                first: first.into(),
-                            });
-                        }
+                    match bad.iter_mut().find(|(field, ..)| *field == at) {
+                        Some((_, count, _)) => *count += 1,
+                        None => bad.push((at, 1, MissingValue { offset, field: at, text: text() })),
                     }
                     f64::NAN
                 }
             };
             if !numbers[at].is_finite() {
                 numbers[at] = f64::NAN;
-                if read.first_missing.is_none() {
-                    let text = String::from_utf8_lossy(bytes).trim().to_owned();
-                    read.first_missing = Some(MissingValue { offset, field: at, text });
-                }
+                read.first_missing.get_or_insert_with(|| MissingValue { offset, field: at, text: text() });
             }
         }
         read.rows += 1;
         each(offset, &numbers)?;
     }
-    read.cut_row = short.map(|(offset, _)| offset);
+    read.cut_row = short.map(|short| short.offset);
+    if let Some((count, first)) = ragged {
+        let line = file.line_of_row(first.offset)?;
+        read.ragged = Some((count, line, first.error(file, layout)?.into()));
+    }
+    for (field, count, first) in bad {
+        let line = file.line_of_row(first.offset)?;
+        let error = not_a_number(file, layout, first.offset, &wanted[field], first.text)?;
+        read.bad_values.push(BadValues { field, count, line, first: error.into() });
+    }
     if read.rows == 0 && tolerance == Tolerance::Strict {
         let line = layout.names_line.unwrap_or(layout.data_line);
         return Err(RecordError::HeaderOnly { path: file.path(), line });
     }
     Ok(read)
+}
+
+/// A row with another number of fields than the header.
+struct Ragged {
+    offset: usize,
+    found: usize,
+    remedy: &'static str,
+}
+
+impl Ragged {
+    fn error(&self, file: &SourceFile<'_>, layout: &TextLayout) -> Result<RecordError, RecordError> {
+        Ok(RecordError::RaggedRow {
+            path: file.path(),
+            line: file.line_of_row(self.offset)?,
+            found: self.found,
+            expected: layout.width(),
+            remedy: self.remedy,
+        })
+    }
 }
 
 /// The value of a field, NaN when it is missing, `None` when it is no number.
@@ -253,7 +253,7 @@ fn value(layout: &TextLayout, field: &WantedField, bytes: &[u8], origin: &mut Op
     if field.kind == ColumnKind::Date {
         return match parse_date_ns(text) {
             // Division rounds correctly, multiplication by 1e-9 does not.
-            Some(ns) => Some((ns - *origin.get_or_insert(ns)) as f64 / 1e9),
+            Some(ns) => ns.checked_sub(*origin.get_or_insert(ns)).map(|ns| ns as f64 / 1e9),
             None => is_missing(text.trim()).then_some(f64::NAN),
         };
     }
@@ -276,9 +276,8 @@ fn not_a_number(
     layout: &TextLayout,
     offset: usize,
     field: &WantedField,
-    bytes: &[u8],
+    text: String,
 ) -> Result<RecordError, RecordError> {
-    let text = String::from_utf8_lossy(bytes).trim().to_owned();
     let repeated = layout.names.get(field.index).is_some_and(|name| *name == text);
     Ok(RecordError::NotANumber {
         path: file.path(),
