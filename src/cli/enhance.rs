@@ -4,7 +4,7 @@ use crate::cli::args::EnhanceArgs;
 use crate::cli::exit_codes::Failure;
 use std::fmt::Write as _;
 use stylet_api::enhancement::{
-    EnhancementResult, ResultSource, enhance_long_recording, enhance_recording, unused_note,
+    EnhancementResult, ResultSource, enhance_long_recording, enhance_recording, impossible, unused_note,
 };
 use stylet_api::output_folder::check_folder;
 use stylet_api::{IdentifiedModel, OutputLock, read_options, resource_estimate};
@@ -21,7 +21,10 @@ const MAX_LISTED: usize = 100;
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
-    let config = args.config.as_deref().map(EnhancerConfigFile::load).transpose()?.unwrap_or_default();
+    let mut config = args.config.as_deref().map(EnhancerConfigFile::load).transpose()?.unwrap_or_default();
+    if let Some(contact) = args.contact {
+        config.enhance.contact = contact.setting();
+    }
     let model = args.model.as_deref().map(IdentifiedModel::load).transpose()?;
     if let Some(model) = &model {
         model.check_algorithm(&config.enhance)?;
@@ -65,6 +68,9 @@ fn command(args: &EnhanceArgs) -> String {
             let _ = write!(command, " {flag} {}", path.display());
         }
     }
+    if let Some(contact) = args.contact {
+        let _ = write!(command, " --contact {}", contact.setting().name());
+    }
     for (flag, on) in [("--repair", args.repair), ("--compare", args.compare)] {
         if on {
             let _ = write!(command, " {flag}");
@@ -100,6 +106,7 @@ fn summary(args: &EnhanceArgs, result: &EnhancementResult) -> String {
     for r in runs {
         let unit = if r.config.model == Model::MultiLayer { "N s/m²" } else { "N s/m" };
         let _ = writeln!(out, "\n{}", r.name);
+        let _ = writeln!(out, "  {}", r.trace.contact.sentence());
         match (r.trace.contact_m, r.trace.contact_s) {
             (Some(z), Some(t)) => {
                 let _ = writeln!(out, "  first contact at {:.2} mm, {t:.3} s", z * 1e3);
@@ -109,6 +116,16 @@ fn summary(args: &EnhanceArgs, result: &EnhancementResult) -> String {
                 let why = if blocking { "see the note" } else { "the force never exceeds its noise in air" };
                 let _ = writeln!(out, "  no contact detected: {why}");
             }
+        }
+        for s in r.trace.zero_steps.iter().take(listed) {
+            let _ = writeln!(
+                out,
+                "  step of the zero of {} N at {:.3} s, {:.2} mm ({})",
+                plus_minus(s.size_n, Some(stylet_stats::Z95 * s.sd_n), 2),
+                s.time_s,
+                s.position_m * 1e3,
+                if s.in_tissue { "in tissue; no layer" } else { "in air" },
+            );
         }
         let _ = writeln!(out, "  {} rupture(s)", r.trace.detections.len());
         for d in r.trace.detections.iter().take(listed) {
@@ -133,6 +150,9 @@ fn summary(args: &EnhanceArgs, result: &EnhancementResult) -> String {
                 interval(e.friction, e.friction_sd),
                 interval(e.drop_n, e.drop_sd_n),
             );
+            for what in impossible(e) {
+                let _ = writeln!(out, "    impossible: {what}");
+            }
         }
         if r.trace.detections.len().max(r.trace.estimates.len()) > listed {
             let _ = writeln!(out, "  the first {listed} of each; events.json and enhance.json have all");

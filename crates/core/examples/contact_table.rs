@@ -2,10 +2,10 @@
 //! of the zero, or a start inside the tissue, and clean ones.
 //!
 //! ```sh
-//! cargo run --release -p stylet-score --example contact_table -- [--seed 1] [--cases 200] [--kind drift] [--list]
+//! cargo run --release -p stylet-core --example contact_table -- [--seed 1] [--cases 200] [--kind drift] [--list]
 //! ```
 //!
-//! Columns: contact within 0.5 mm of the surface, of the online core and of the recording as a whole; ruptures missed and
+//! Columns: contact within 0.5 mm of the surface; ruptures missed and
 //! false of all; true stiffnesses inside their 95 % intervals; median error of K.
 #![allow(clippy::print_stdout, reason = "the table")]
 

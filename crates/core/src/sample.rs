@@ -288,6 +288,8 @@ pub struct Output {
     pub contact_m: Option<f64>,
     /// Standard deviation of `contact_m` in m; zero where the algorithm does not provide it (`Stylet`).
     pub contact_sd_m: f64,
+    /// Probability of the contact against a moving baseline or a step of the zero without one, 0 to 1 (`Stylet`).
+    pub contact_probability: f64,
     /// Baseline of the force (`Stylet`).
     pub baseline: Baseline,
     /// Step of the zero reported at this sample (`Stylet`).

@@ -1,5 +1,6 @@
 //! Outputs of the online core over a recording, as columns.
 
+use crate::contact_finding::{ContactAssessor, ContactFinding};
 use crate::enhancer_with_model::{EnhancerWithModel, enhancer_for};
 use crate::offline_least_squares::{LayerSample, OfflineEstimate, fit_layer_offline};
 use crate::score::Score;
@@ -46,6 +47,8 @@ pub struct Trace {
     pub contact_s: Option<f64>,
     /// Standard deviation of the position of the contact in m; zero where the algorithm does not provide it.
     pub contact_sd_m: f64,
+    /// How the recording begins.
+    pub contact: ContactFinding,
     /// Steps of the sensor's zero.
     pub zero_steps: Vec<ZeroStep>,
     /// Baseline of the force at the last sample.
@@ -93,17 +96,17 @@ impl Trace {
         mut each: impl FnMut(usize, &stylet_core::Output),
     ) -> Self {
         let mut trace = Trace::default();
+        let (mut assessor, setting) = (ContactAssessor::default(), core.contact_setting());
         for (index, (s, &force_n)) in recording.samples().zip(force_n).enumerate() {
-            let out = core.step(Sample {
-                time_s: s.time_s,
-                position_m: s.position_m,
-                velocity_mps: s.velocity_mps,
-                force_n,
-            });
+            let sample =
+                Sample { time_s: s.time_s, position_m: s.position_m, velocity_mps: s.velocity_mps, force_n };
+            let out = core.step(sample);
+            assessor.push(&sample, &out);
             each(index, &out);
             trace.push(&out);
             trace.record_events(&out);
         }
+        trace.contact = assessor.finish(setting);
         trace.contact_s =
             trace.contact_m.and_then(|z| recording.samples().find(|s| s.position_m >= z)).map(|s| s.time_s);
         trace

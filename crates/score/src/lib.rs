@@ -2,6 +2,7 @@
 //! scores are defined in `docs/reference/algorithms.md`.
 #![forbid(unsafe_code)]
 
+mod contact_finding;
 mod enhancement_trace;
 mod enhancer_with_model;
 mod measured_score;
@@ -10,6 +11,7 @@ mod rupture_matching;
 mod score;
 mod scorer;
 
+pub use contact_finding::{ContactAssessor, ContactFinding, ContactHypothesis};
 pub use enhancement_trace::{Trace, algorithm_name, coefficients, model_name, score_run};
 pub use enhancer_with_model::{EnhancerWithModel, MAX_STORED_SAMPLES, enhancer_for};
 pub use measured_score::{MeasuredRecording, MeasuredScore, ModelFrictionScore};

@@ -41,10 +41,37 @@ pub struct EnhanceArgs {
     /// Run both the multi-layer and the Kelvin-Voigt model.
     #[arg(long)]
     pub compare: bool,
+    /// Contact: found by evidence (auto), at `surface_m` of the configuration (known), or none, because the recording begins in the
+    /// tissue [default: that of the configuration, auto].
+    #[arg(long, value_name = "SETTING")]
+    pub contact: Option<ContactArg>,
     #[command(flatten)]
     pub results: OutputArgs,
     #[command(flatten)]
     pub limits: ResourceLimits,
+}
+
+/// Source of the first contact.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+pub enum ContactArg {
+    /// Found by evidence.
+    Auto,
+    /// At the surface of the configuration.
+    Known,
+    /// None: the needle is in the tissue from the first sample on.
+    None,
+}
+
+impl ContactArg {
+    /// The setting of the core.
+    pub fn setting(self) -> stylet_core::config::Contact {
+        use stylet_core::config::Contact;
+        match self {
+            Self::Auto => Contact::Detected,
+            Self::Known => Contact::Known,
+            Self::None => Contact::None,
+        }
+    }
 }
 
 /// Arguments of `stylet convert`.
@@ -103,6 +130,10 @@ pub struct ListenArgs {
     /// Configuration of the online algorithm: an Enhance(...) or Scenario(...) file.
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
+    /// Contact: found by evidence (auto), at `surface_m` of the configuration (known), or none, because the stream begins in the
+    /// tissue [default: that of the configuration, auto].
+    #[arg(long, value_name = "SETTING")]
+    pub contact: Option<ContactArg>,
     /// End after this many seconds (with --udp).
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub duration_s: Option<f64>,

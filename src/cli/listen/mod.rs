@@ -62,7 +62,10 @@ impl End {
 /// # Errors
 /// [`Failure`] with the exit code that fits; the summary is printed all the same.
 pub fn listen(args: &ListenArgs) -> Result<(), Failure> {
-    let config = args.config.as_deref().map(EnhancerConfigFile::load).transpose()?.unwrap_or_default();
+    let mut config = args.config.as_deref().map(EnhancerConfigFile::load).transpose()?.unwrap_or_default();
+    if let Some(contact) = args.contact {
+        config.enhance.contact = contact.setting();
+    }
     let broadcast = Arc::new(Broadcast::default());
     let mut session = Session::new(&config, broadcast.clone());
     let mut receiver = args.udp.map(|port| UdpReceiver::bind(&args.host, port)).transpose()?;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use stylet_core::LayerEstimate;
 use stylet_core::config::Model;
 use stylet_record::QualityNote;
-use stylet_score::Trace;
+use stylet_score::{ContactFinding, Trace};
 
 /// `enhance.json`.
 #[derive(Serialize)]
@@ -30,6 +30,7 @@ pub(super) struct RunResult {
     model: String,
     contact_m: Option<f64>,
     contact_s: Option<f64>,
+    contact: ContactFinding,
     ruptures: Vec<Rupture>,
     layers: Vec<Layer>,
     /// Samples that the algorithm ignored; their rows of `enhanced.csv` say why.
@@ -59,6 +60,9 @@ struct Layer {
     friction_unit: &'static str,
     drop_n: f64,
     cumulative_friction_added_ns_per_m: f64,
+    /// What cannot be about these numbers.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    impossible: Vec<String>,
     /// 95 % intervals and cumulative friction, where the algorithm provides them.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     intervals: Option<Intervals>,
@@ -91,6 +95,28 @@ fn interval(value: f64, sd: f64) -> [f64; 2] {
     [value - stylet_stats::Z95 * sd, value + stylet_stats::Z95 * sd]
 }
 
+/// What cannot be about an estimate: no layer pushes less than nothing. Names the number and why.
+#[must_use]
+pub fn impossible(e: &LayerEstimate) -> Vec<String> {
+    let mut out = Vec::new();
+    for (name, value, sd) in
+        [("stiffness", e.stiffness_n_per_m, e.stiffness_sd), ("friction", e.friction, e.friction_sd)]
+    {
+        if value + stylet_stats::Z95 * sd < 0.0 {
+            out.push(format!(
+                "{name} is negative beyond its interval: the force does not follow K and b here"
+            ));
+        }
+    }
+    if e.thickness_m > MAX_LAYER_M {
+        out.push("thickness is more than a metre: the position is not in metres".to_owned());
+    }
+    out
+}
+
+/// Thickest layer in m.
+const MAX_LAYER_M: f64 = 1.0;
+
 /// Results of a run.
 pub(super) fn results_of_run(run: &AlgorithmRun) -> RunResult {
     let friction_unit = match run.config.model {
@@ -106,12 +132,14 @@ pub(super) fn results_of_run(run: &AlgorithmRun) -> RunResult {
         friction_unit,
         drop_n: e.drop_n,
         cumulative_friction_added_ns_per_m: e.added_friction_ns_per_m,
+        impossible: impossible(e),
         intervals: Intervals::new(e),
     };
     RunResult {
         model: run.name.clone(),
         contact_m: run.trace.contact_m,
         contact_s: run.trace.contact_s,
+        contact: run.trace.contact.clone(),
         ruptures: run
             .trace
             .detections

@@ -16,7 +16,7 @@ use stylet_record::csv_writer::RowWriter;
 use stylet_record::disk_table::DiskTableWriter;
 use stylet_record::{LongRecording, QualityNote, Recording};
 use stylet_scenario::EnhancerConfigFile;
-use stylet_score::{EnhancerWithModel, enhancer_for};
+use stylet_score::{ContactAssessor, EnhancerWithModel, enhancer_for};
 
 /// As [`enhance_recording`](super::enhance_recording) for a recording on disk: files and hash are bitwise the same, except the
 /// report of a recording of over 20 000 samples, which shows a selection. `enhanced.csv` is written to the locked folder at once,
@@ -54,6 +54,7 @@ pub fn enhance_long_recording(
     let mut plot = PlotSampler::new(samples, regressors.len());
     let mut outs = vec![Output::default(); regressors.len()];
     let (mut index, mut hashed_row) = (0, Vec::new());
+    let mut assessors = vec![ContactAssessor::default(); regressors.len()];
     recording.for_each_sample(|s, row| -> Result<(), Error> {
         let sample = Sample {
             time_s: s.time_s,
@@ -62,8 +63,10 @@ pub fn enhance_long_recording(
             force_n: s.force_n,
         };
         hashed_row.clear();
-        for ((enhancer, out), run) in enhancers.iter_mut().zip(&mut outs).zip(&mut runs) {
+        let each = enhancers.iter_mut().zip(&mut outs).zip(&mut runs).zip(&mut assessors);
+        for (((enhancer, out), run), assessor) in each {
             *out = enhancer.step(sample);
+            assessor.push(&sample, out);
             run.trace.record_events(out);
             hashed_row.extend(hashed_values(out));
         }
@@ -76,6 +79,9 @@ pub fn enhance_long_recording(
         index += 1;
         Ok(())
     })?;
+    for ((run, assessor), enhancer) in runs.iter_mut().zip(&assessors).zip(&enhancers) {
+        run.trace.contact = assessor.finish(enhancer.contact_setting());
+    }
     drop(enhancers);
     let HashingWriter { file, mut hash } = table.finish().map_err(failed)?;
     let columns = columns.finish().map_err(failed)?;

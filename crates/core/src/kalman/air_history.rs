@@ -143,6 +143,11 @@ impl AirEvidence {
         self.bend.nats - self.quiet.nats.max(self.step.nats)
     }
 
+    /// Probability of a contact.
+    pub(super) fn contact_probability(&self) -> f64 {
+        1.0 / (1.0 + libm::exp(-self.contact_nats()))
+    }
+
     /// Log odds of a step of the zero against everything else.
     pub(super) fn step_nats(&self) -> f64 {
         self.step.nats - self.quiet.nats.max(self.bend.nats)

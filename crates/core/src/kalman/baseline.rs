@@ -175,6 +175,7 @@ impl KalmanEnhancer {
         // The line of the load crosses that of the baseline.
         let variance = 4.0 * evidence.event_variance(&bend) + fit.p[0][0];
         self.output.contact_m = Some(onset_m);
+        self.output.contact_probability = evidence.contact_probability();
         self.output.contact_sd_m = libm::sqrt(variance) / at_least(1e-300, bend.size);
         self.baseline.schedule();
     }
@@ -201,12 +202,13 @@ impl KalmanEnhancer {
         self.baseline.schedule();
         self.operations += self.baseline.history.evaluation_operations();
         let evidence = self.baseline.history.evaluate();
+        self.output.contact_probability = evidence.contact_probability();
         if evidence.contact_nats() > SETTLED_NATS {
             self.baseline.settled = true;
         } else if evidence.contact_nats() < -DECISION_NATS {
             self.in_tissue = false;
             self.output.contact_m = None;
-            self.output.contact_sd_m = 0.0;
+            (self.output.contact_sd_m, self.output.contact_probability) = (0.0, 0.0);
             (self.misfit, self.misfit_weight, self.base_law_failed) = (FAILED_MISFIT, 1.0, false);
             self.peak_force_n = 0.0;
             (self.candidate, self.deferred, self.spike_samples) = (None, false, 0);
