@@ -300,9 +300,6 @@ fn cause(search: &Search, effect: &AnyEffect, half_widths: &[f64], removed: impl
             .map(|((p, value), half)| (p.path.to_owned(), estimate(value, *half)))
             .collect(),
         gain_nats,
-        share: 0.0,
-        at_bound: Vec::new(),
-        general_forms: Vec::new(),
-        remark: None,
+        ..Cause::default()
     }
 }
