@@ -76,6 +76,13 @@ fn extended_scenario_has_the_causes_and_the_parameters_of_their_model() {
     assert_eq!(of(&search, Verdict::Named, vec![saturated()]), (base.clone(), vec!["saturation"]));
     let both = vec![drifts(), saturated()];
     assert_eq!(of(&search, Verdict::Unknown, both).1, ["force_drift", "saturation"]);
+    // Beside an unmodelled force the best partial model is kept, causes or none.
+    let partial =
+        PartialModel { effects: vec!["force_drift".to_owned(), "force_bias".to_owned()], share: 0.6 };
+    let d = Diagnosis { partial: Some(partial), ..diagnosis(Verdict::Unknown, vec![]) };
+    let s = extended_scenario(&scenario, &search, &d);
+    assert_eq!(s.tissue, best);
+    assert_eq!(s.effects.iter().map(|e| e.id()).collect::<Vec<_>>(), ["force_drift", "force_bias"]);
     search.best.model.effects.clear();
     assert_eq!(of(&search, Verdict::None, vec![]), (best, vec![]));
     assert_eq!(of(&search, Verdict::Unknown, vec![]), (base, vec![]));
