@@ -50,10 +50,25 @@ fn arguments() -> Cli {
     })
 }
 
+/// Limit on the memory for reading files, in bytes.
+fn memory_limit(command: &Command) -> f64 {
+    let limits = match command {
+        Command::Run(args) => args.limits,
+        Command::Enhance(args) => args.limits,
+        Command::Diagnose(args) => args.limits,
+        Command::Predict(args) => args.limits,
+        Command::Identifiability(args) => args.resources,
+        Command::Plan(args) => args.resources,
+        _ => resource_limits::ResourceLimits::default(),
+    };
+    limits.limit_memory
+}
+
 /// Runs the command line and returns the exit code (see [`exit_codes`]).
 #[must_use]
 pub fn main() -> ExitCode {
     let cli = arguments();
+    stylet_record::memory_limit::set_memory_limit(memory_limit(&cli.command) as u64);
     // A panic is a bug: it ends with the exit code of internal errors.
     let outcome = std::panic::catch_unwind(|| match &cli.command {
         Command::Run(args) => run::run(args),

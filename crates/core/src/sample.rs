@@ -312,6 +312,7 @@ impl Output {
     pub(crate) fn ignore(&mut self, why: UnusedReason) {
         self.detection = None;
         self.estimate = None;
+        self.zero_step = None;
         self.restarted = false;
         self.used = false;
         self.unused_reason = Some(why);

@@ -1,8 +1,6 @@
 //! Reader of recordings: text tables and files of other programs, or an error with file, line, column and remedy.
 
 use std::borrow::Cow;
-use std::fs;
-use std::io;
 use std::path::Path;
 
 use encoding_rs::{Encoding, UTF_8};
@@ -13,6 +11,7 @@ use crate::columns::{ColumnRole, MappedColumns, map_columns, map_series};
 use crate::error::RecordError;
 use crate::file_formats::{FileFormat, Foreign};
 use crate::inspect::{InspectOptions, inspect_bytes};
+use crate::memory_limit::read_limited;
 use crate::quality::{QualityNote, assess};
 use crate::recording::Recording;
 use crate::text::encoding;
@@ -63,10 +62,7 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, RecordError> {
     if path.is_dir() {
         return Err(RecordError::IsDirectory { path: path.to_owned() });
     }
-    fs::read(path).map_err(|source| match source.kind() {
-        io::ErrorKind::NotFound => RecordError::NoSuchFile { path: path.to_owned() },
-        _ => RecordError::Unreadable { path: path.to_owned(), source },
-    })
+    read_limited(path)
 }
 
 /// Reads a recording from the bytes of a file. `path` appears in messages, and other files that a column map names are looked

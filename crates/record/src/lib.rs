@@ -27,6 +27,7 @@
 //! | [`units`] | units in names and rows of units |
 //! | [`long_recording`], [`disk_table`] | recordings longer than memory, on disk |
 //! | [`file_formats`] | spreadsheets, MATLAB, HDF5, Parquet, MCAP, ROS 2 bags (most with the feature `formats`) |
+//! | [`memory_limit`] | limit on the memory that reading a file may take |
 //! | `quality` | [`QualityNote`]s on implausible, saturated, irregular or outlying data |
 //! | [`sensor_artefacts`] | samples that a force law cannot explain: sensor range, resolution, spikes |
 //! | [`mod@downsample`] | averaging of recordings that are too long for a diagnosis |
@@ -47,6 +48,7 @@ pub mod ground_truth;
 mod insertion_axis;
 pub mod inspect;
 pub mod long_recording;
+pub mod memory_limit;
 mod quality;
 pub mod recording;
 mod sample_stream;

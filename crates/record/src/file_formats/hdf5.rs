@@ -1,6 +1,7 @@
 //! MATLAB v7.3 and other HDF5 files.
 
 use super::numeric_columns::{NamedColumn, NumericColumns};
+use crate::memory_limit::{self, VALUE_BYTES};
 use crate::units::{Unit, parse_unit};
 use hdf5_pure::{AttrValue, Dataset, Group};
 
@@ -128,6 +129,11 @@ impl NumericColumns for File {
             let column =
                 self.columns.iter().find(|c| c.name == *name).ok_or_else(|| format!("no \"{name}\""))?;
             let dataset = self.file.dataset(&column.path).map_err(damaged)?;
+            let shape = dataset.shape().map_err(damaged)?;
+            let values = shape.iter().fold(1_u64, |all, n| all.saturating_mul(*n));
+            // Columns that were read before take their memory too.
+            let all = values.saturating_mul(wanted.len() as u64).saturating_mul(VALUE_BYTES);
+            memory_limit::check(&format!("\"{name}\" with {values} declared values"), all)?;
             let values =
                 dataset.read_f64().map_err(|e| format!("\"{name}\" is not a column of numbers ({e})"))?;
             Ok(match column.part {

@@ -1,6 +1,7 @@
 //! MATLAB files of the versions 5 to 7 (`save` without `-v7.3`): numeric arrays and structs of them.
 
 use super::numeric_columns::{NamedColumn, NumericColumns};
+use crate::memory_limit;
 use flate2::read::ZlibDecoder;
 use std::io::Read;
 
@@ -8,6 +9,8 @@ use std::io::Read;
 const HEADER_BYTES: usize = 128;
 /// Most bytes of a decompressed variable; more is a damaged length.
 const MAX_VARIABLE_BYTES: u64 = 1 << 30;
+/// Memory of a variable with its numbers, in units of its decompressed size: single bytes become 64-bit numbers, which are copied.
+const NUMBER_SHARE: u64 = 17;
 /// Most levels of nested structs.
 const MAX_DEPTH: usize = 6;
 /// Most columns of a matrix that are listed.
@@ -40,9 +43,11 @@ impl File {
                 MI_COMPRESSED => {
                     let mut inflated = Vec::new();
                     ZlibDecoder::new(data)
-                        .take(MAX_VARIABLE_BYTES)
+                        .take(MAX_VARIABLE_BYTES.min(memory_limit::limit_bytes() / NUMBER_SHARE + 1))
                         .read_to_end(&mut inflated)
                         .map_err(|e| damaged(&format!("a variable cannot be decompressed, {e}")))?;
+                    let needed = (inflated.len() as u64).saturating_mul(NUMBER_SHARE);
+                    memory_limit::check("a decompressed variable", needed)?;
                     let mut inner = Elements { bytes: &inflated, little };
                     while let Some((kind, data)) = inner.next()? {
                         if kind == MI_MATRIX {

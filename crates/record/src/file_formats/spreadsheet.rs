@@ -1,11 +1,15 @@
 //! Spreadsheets: xlsx, xls, ods, as the text table that their program would export.
 
-use calamine::{Data, Range, Reader, open_workbook_auto_from_rs};
+use crate::memory_limit;
+use calamine::{Data, Range, Reader, Sheets, Xlsx, open_workbook_auto_from_rs};
 use std::fmt::Write as _;
 use std::io::Cursor;
 
 /// Most cells of a sheet; a damaged file may announce any number.
 const MAX_CELLS: usize = 200_000_000;
+
+/// Memory of a cell in bytes, with its text.
+const CELL_BYTES: u64 = 48;
 
 /// A sheet as text, one line per row, columns separated by tabs. Without a name the sheet with most numbers is taken.
 pub(super) fn to_text(bytes: &[u8], sheet: Option<&str>) -> Result<Vec<u8>, String> {
@@ -16,6 +20,11 @@ pub(super) fn to_text(bytes: &[u8], sheet: Option<&str>) -> Result<Vec<u8>, Stri
         .map_err(|e| format!("it cannot be read ({e}); save it as xlsx, ods or CSV"))?;
     let names = book.sheet_names();
     let list = || names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
+    if let Sheets::Xlsx(book) = &mut book {
+        for name in names.iter().filter(|name| sheet.is_none_or(|wanted| wanted == *name)) {
+            check_extent(book, name)?;
+        }
+    }
     let range = match sheet {
         Some(name) if !names.iter().any(|existing| existing == name) => {
             return Err(format!("it has no sheet \"{name}\"; it has {}", list()));
@@ -61,6 +70,21 @@ pub(super) fn to_text(bytes: &[u8], sheet: Option<&str>) -> Result<Vec<u8>, Stri
         text.push('\n');
     }
     Ok(text.into_bytes())
+}
+
+/// Compares the rectangle around the cells of a sheet, which is allocated as a whole, with the limit on memory: two distant cells make it
+/// any size.
+fn check_extent(book: &mut Xlsx<Cursor<&[u8]>>, name: &str) -> Result<(), String> {
+    let Ok(mut cells) = book.worksheet_cells_reader(name) else { return Ok(()) };
+    let (mut first, mut last) = ((u32::MAX, u32::MAX), (0, 0));
+    while let Ok(Some(cell)) = cells.next_cell() {
+        let (row, column) = cell.get_position();
+        first = (first.0.min(row), first.1.min(column));
+        last = (last.0.max(row), last.1.max(column));
+    }
+    let length = |first: u32, last: u32| u64::from(last.saturating_sub(first)) + 1;
+    let count = length(first.0, last.0).saturating_mul(length(first.1, last.1));
+    memory_limit::check(&format!("the sheet \"{name}\" of {count} cells"), count.saturating_mul(CELL_BYTES))
 }
 
 fn write_cell(text: &mut String, cell: &Data) {

@@ -2,12 +2,16 @@
 
 use super::numeric_columns::{NamedColumn, NumericColumns};
 use super::ros_messages::{Definition, MAX_ARRAY_LENGTH};
+use crate::memory_limit::{self, VALUE_BYTES};
 use crate::units::{Unit, parse_unit};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
 /// Field of every topic with the log time of a message.
 const LOG_TIME: &str = "log_time";
+
+/// Messages after which the memory that they take is compared with the limit.
+const MESSAGES_PER_CHECK: usize = 1 << 16;
 
 /// A message of a log.
 pub(super) struct Message<'a> {
@@ -185,6 +189,10 @@ impl<L: MessageLog> NumericColumns for Topics<L> {
         let (mut numbers, mut count) = (Vec::new(), 0_usize);
         self.log.for_each(&mut |message| {
             count += 1;
+            if count.is_multiple_of(MESSAGES_PER_CHECK) {
+                let needed = (count as u64).saturating_mul(wanted.len() as u64).saturating_mul(2 * VALUE_BYTES);
+                memory_limit::check(&format!("a log of more than {count} messages"), needed)?;
+            }
             if !parts.iter().any(|(t, _)| *t == message.topic) {
                 return Ok(());
             }
