@@ -13,13 +13,17 @@ import resource
 import shutil
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+import zipfile
+import zlib
 
 STYLET = os.path.abspath(sys.argv[1])
+REPOSITORY = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 LIMIT_S = 60
 ATTACKS = []
 
@@ -541,6 +545,76 @@ def an_endless_pipe():
 def a_pipe_without_a_line_end():
     code, _, err, peak = run(shell="$S enhance /dev/zero --limit-memory 300MB --out zero")
     assert code == 2 and peak < 6e8, (code, err[-300:], peak)
+
+
+def too_large(name, limit="300MB", most=6e8):
+    code, _, err, peak = run("enhance", name, "--limit-memory", limit, "--out", "large")
+    assert code == 2 and "limit" in err and peak < most, (code, err[-300:], peak)
+
+
+@attack
+def a_small_matlab_file_that_decompresses_to_a_gigabyte():
+    def element(kind, data):
+        return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+    def variable(name, rows):
+        head = element(6, struct.pack("<II", 9, 0)) + element(5, struct.pack("<ii", rows, 1)) + element(1, name)
+        data = element(2, bytes(rows))
+        return struct.pack("<II", 14, len(head) + len(data)) + head + data
+
+    out = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM"
+    for name in (b"time_s", b"position_m", b"force_n"):
+        packed = zlib.compress(variable(name, 300_000_000), 9)
+        out += struct.pack("<II", 15, len(packed)) + packed
+    write("bomb.mat", out)
+    too_large("bomb.mat")
+
+
+@attack
+def a_spreadsheet_with_two_distant_cells():
+    main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+    office = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+    package = "http://schemas.openxmlformats.org/package/2006/relationships"
+    with zipfile.ZipFile("bomb.xlsx", "w", zipfile.ZIP_DEFLATED) as book:
+        book.writestr("_rels/.rels", f'<Relationships xmlns="{package}"><Relationship Id="rId1" Type="{office}/officeDocument" Target="xl/workbook.xml"/></Relationships>')
+        book.writestr("xl/_rels/workbook.xml.rels", f'<Relationships xmlns="{package}"><Relationship Id="rId1" Type="{office}/worksheet" Target="worksheets/sheet1.xml"/></Relationships>')
+        book.writestr("xl/workbook.xml", f'<workbook xmlns="{main}" xmlns:r="{office}"><sheets><sheet name="S" sheetId="1" r:id="rId1"/></sheets></workbook>')
+        book.writestr("xl/worksheets/sheet1.xml", f'<worksheet xmlns="{main}"><sheetData><row r="1"><c r="A1"><v>1</v></c></row><row r="1048576"><c r="XFD1048576"><v>2</v></c></row></sheetData></worksheet>')
+    too_large("bomb.xlsx")
+
+
+@attack
+def an_hdf5_file_that_declares_three_hundred_million_rows():
+    fixture = os.path.join(REPOSITORY, "crates/record/tests/foreign/matlab.mat")
+    with open(fixture, "rb") as file:
+        data = file.read()
+    write("bomb_hdf5.mat", data.replace(struct.pack("<Q", 60), struct.pack("<Q", 300_000_000)))
+    write("map.ron", 'Columns(time: (name: "time", scale: 1e-3), position: (name: "pz", scale: 1e-3), force: (name: "log.wrench.3", scale: -1.0))')
+    code, _, err, peak = run("enhance", "bomb_hdf5.mat", "--columns", "map.ron", "--limit-memory", "300MB", "--out", "large")
+    assert code == 2 and peak < 6e8, (code, err[-300:], peak)
+
+
+@attack
+def an_mcap_log_without_its_end():
+    succeeds("run", "gel.ron", "--out", "r3")
+    succeeds("convert", "r3/recording.csv", "whole.mcap")
+    write("map.ron", 'Columns(time: (name: "/insertion.time_s"), position: (name: "/insertion.position_m"), force: (name: "/insertion.force_n"))')
+    with open("whole.mcap", "rb") as file:
+        data = file.read()
+    for cut in (8, 20, 100, 1000):
+        write("cut.mcap", data[:-cut])
+        succeeds("enhance", "cut.mcap", "--columns", "map.ron", "--out", f"cut{cut}")
+
+
+@attack
+def scenarios_with_absurd_values_and_names():
+    for old, new in (("50.0", "1e308"), ("9000.0", "1e300"), ("0.4", "1e300"), ("8.0", "1e300"), ("0.0023", "-1e300")):
+        write("absurd.ron", SCENARIO.replace(old, new))
+        code, _, err, _ = run("run", "absurd.ron", "--out", "absurd")
+        assert code == 2 and "0" * 30 not in err.replace("\n", "").replace(" ", ""), (new, code, err)
+    shutil.copy("gel.ron", "two\nlines.ron")
+    succeeds("run", "two\nlines.ron", "--out", "lines")
+    succeeds("run", "lines/scenario.ron", "--out", "again")
 
 
 if __name__ == "__main__":

@@ -109,8 +109,10 @@ pub struct ConvertArgs {
 
 A sample is a line `time_s,position_m,force_n[,velocity_mps]` or a JSON object with these names; a datagram
 may hold several. Results go as JSON lines to standard output and to --forward (PlotJuggler: UDP server,
-message protocol JSON). A slow reader loses its own oldest lines and never delays the algorithm; every line
-and the summary on standard error give the number lost. The datagram `end` ends the session.")]
+message protocol JSON); each says whether its sample was used and why not. A wrong time stamp is ignored, a
+new clock restarts the algorithm. A slow reader loses its own oldest lines and never delays the algorithm;
+every line and the summary on standard error give the number lost. The datagram `end`, Ctrl-C or SIGTERM end
+the session.")]
 pub struct ListenArgs {
     /// Receive samples on this UDP port.
     #[arg(long, value_name = "PORT", conflicts_with = "stdin", required_unless_present = "stdin")]
@@ -134,7 +136,7 @@ pub struct ListenArgs {
     /// tissue [default: that of the configuration, auto].
     #[arg(long, value_name = "SETTING")]
     pub contact: Option<ContactArg>,
-    /// End after this many seconds (with --udp).
+    /// End after this many seconds.
     #[arg(long, value_name = "SECONDS", value_parser = parse_seconds)]
     pub duration_s: Option<f64>,
     /// Print no lines.
