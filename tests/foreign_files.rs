@@ -118,12 +118,12 @@ fn two_inputs_of_one_name_do_not_share_a_default_folder() {
     let default = "stylet-out/p-q-recording";
     scratch.succeeds(&["enhance", "p/q/recording.csv"]);
     scratch.succeeds(&["enhance", "./p/q/recording.csv"]);
-    scratch.is_refused(
-        &["enhance", "p-q/recording.csv"],
-        &format!("{default}/manifest.json")
-            .replace("/manifest.json", "/enhance.json")
-            .replace("/enhance.json", "/manifest.json"),
-    );
+    let before = scratch.text(&format!("{default}/enhance.json"));
+    let output = scratch.stylet(&["enhance", "p-q/recording.csv"]);
+    let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{stderr}");
+    assert!(stderr.contains(default) && stderr.contains("p/q/recording.csv"), "{stderr}");
+    assert_eq!(scratch.text(&format!("{default}/enhance.json")), before);
     scratch.write("other/gel.ron", SCENARIO);
     scratch.succeeds(&["run", "gel.ron"]);
     let output = scratch.stylet(&["run", "other/gel.ron"]);
