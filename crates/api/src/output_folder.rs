@@ -4,21 +4,20 @@
 //! process killed before that rename leaves the old set, one killed after it the new set: the next command that uses the folder completes
 //! the move ([`recover`]). After a write error the old set is restored.
 
+mod manifest;
 mod replaceable;
 
 use crate::error::Error;
+pub use manifest::MANIFEST;
+use manifest::{Manifest, hex, sum, sum_of_file};
 use replaceable::{Content, check_files, check_same_input, comparable};
-pub use replaceable::{check_folder, check_own_file};
-use serde::{Deserialize, Serialize};
+pub use replaceable::{Inputs, check_folder, check_own_file};
 use sha2::{Digest, Sha256};
-use std::collections::BTreeMap;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The file that lists the files of the set; written last.
-pub const MANIFEST: &str = "manifest.json";
 /// Subfolder in which a set is staged.
 const NEW: &str = ".stylet-new";
 /// Subfolder of a complete set whose files are being moved to their places.
@@ -38,25 +37,6 @@ const RESULT_FILES: [(&str, &str); 9] = [
     ("claims.json", "reproduce"),
     ("cases.json", "benchmark plan"),
 ];
-
-/// `manifest.json`: version, and the files of a set with their SHA-256.
-#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Manifest {
-    stylet: String,
-    sha256: BTreeMap<String, String>,
-    /// The input, in a folder that was named after it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    input: Option<String>,
-}
-
-/// Inputs of a command, which its outputs must not replace.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Inputs {
-    /// All files read.
-    pub files: Vec<PathBuf>,
-    /// The one after which the output folder is named; `None` when the folder was given.
-    pub names_folder: Option<PathBuf>,
-}
 
 /// Exclusive use of an output folder, until it is dropped.
 #[derive(Debug)]
@@ -451,20 +431,6 @@ fn remove_scratch(folder: &Path) -> io::Result<()> {
         }
     }
     Ok(())
-}
-
-fn sum(content: &[u8]) -> String {
-    hex(&Sha256::digest(content))
-}
-
-fn sum_of_file(path: &Path) -> io::Result<String> {
-    let mut hash = Sha256::new();
-    io::copy(&mut File::open(path)?, &mut hash)?;
-    Ok(hex(&hash.finalize()))
-}
-
-fn hex(hash: &[u8]) -> String {
-    hash.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use crate::columns::{ColumnRole, MappedColumns, map_columns, map_series};
 use crate::error::RecordError;
 use crate::file_formats::{FileFormat, Foreign};
 use crate::inspect::{InspectOptions, inspect_bytes};
-use crate::memory_limit::read_limited;
+use crate::memory_limit::{self, read_limited};
 use crate::quality::{QualityNote, assess};
 use crate::recording::Recording;
 use crate::text::encoding;
@@ -62,7 +62,11 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, RecordError> {
     if path.is_dir() {
         return Err(RecordError::IsDirectory { path: path.to_owned() });
     }
-    read_limited(path)
+    let bytes = read_limited(path)?;
+    if FileFormat::detect(&bytes).is_none() {
+        memory_limit::check_text(&bytes, path)?;
+    }
+    Ok(bytes)
 }
 
 /// Reads a recording from the bytes of a file. `path` appears in messages, and other files that a column map names are looked

@@ -15,6 +15,7 @@ const UNLIMITED: u64 = u64::MAX;
 static LIMIT_BYTES: AtomicU64 = AtomicU64::new(UNLIMITED);
 
 /// Bytes of a value read into a column, with the copy that the recording takes.
+#[cfg_attr(not(feature = "formats"), allow(dead_code))]
 pub(crate) const VALUE_BYTES: u64 = 16;
 /// Bytes of a line of text once it is read: its columns, and the place of the line.
 const LINE_BYTES: u64 = 64;
@@ -55,8 +56,7 @@ pub(crate) fn read_limited(path: &Path) -> Result<Vec<u8>, RecordError> {
         io::ErrorKind::NotFound => RecordError::NoSuchFile { path: path.to_owned() },
         _ => RecordError::Unreadable { path: path.to_owned(), source },
     };
-    let too_large =
-        |what: String| RecordError::Foreign { path: path.to_owned(), kind: "too large", what };
+    let too_large = |what: String| RecordError::Foreign { path: path.to_owned(), kind: "too large", what };
     let file = File::open(path).map_err(unreadable)?;
     let declared = file.metadata().map_err(unreadable)?.len();
     check("the file", declared).map_err(too_large)?;
@@ -67,10 +67,16 @@ pub(crate) fn read_limited(path: &Path) -> Result<Vec<u8>, RecordError> {
     if bytes.len() as u64 > declared.max(most) {
         check("what the pipe delivers", limit.saturating_add(1)).map_err(too_large)?;
     }
-    if crate::file_formats::FileFormat::detect(&bytes).is_none() {
-        let lines = bytes.iter().filter(|byte| **byte == b'\n').count() as u64;
-        let needed = (bytes.len() as u64).saturating_add(lines.saturating_mul(LINE_BYTES));
-        check(&format!("the file with its {lines} lines"), needed).map_err(too_large)?;
-    }
     Ok(bytes)
+}
+
+/// Refuses a text whose numbers would take more than the limit.
+pub(crate) fn check_text(bytes: &[u8], path: &Path) -> Result<(), RecordError> {
+    let lines = bytes.iter().filter(|byte| **byte == b'\n').count() as u64;
+    let needed = (bytes.len() as u64).saturating_add(lines.saturating_mul(LINE_BYTES));
+    check(&format!("the file with its {lines} lines"), needed).map_err(|what| RecordError::Foreign {
+        path: path.to_owned(),
+        kind: "too large",
+        what,
+    })
 }

@@ -1,6 +1,6 @@
 //! Which existing files an output may replace: those that Stylet wrote, and never an input.
 
-use super::{Inputs, MANIFEST, Manifest, sum, sum_of_file};
+use super::manifest::{MANIFEST, Manifest, sum, sum_of_file};
 use crate::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -27,6 +27,15 @@ const NOT_LISTED: &str = "is not a file that Stylet wrote (no manifest.json list
 const OTHER_MANIFEST: &str = "is not a manifest of Stylet";
 /// An input.
 const INPUT: &str = "is an input of this command";
+
+/// Inputs of a command, which its outputs must not replace.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Inputs {
+    /// All files read.
+    pub files: Vec<PathBuf>,
+    /// The one after which the output folder is named; `None` when the folder was given.
+    pub names_folder: Option<PathBuf>,
+}
 
 /// Content of a new file, as far as it is known.
 pub(super) enum Content<'a> {

@@ -26,7 +26,9 @@ fn stream(bytes: &[u8]) -> MessageReader<Cursor<&[u8]>> {
         // A truncated log has no footer.
         skip_end_magic: true,
         prevalidate_chunk_crcs: true,
-        record_length_limit: Some(most.min(bytes.len().saturating_mul(100).clamp(MIN_LIMIT_BYTES, MAX_LIMIT_BYTES))),
+        record_length_limit: Some(
+            most.min(bytes.len().saturating_mul(100).clamp(MIN_LIMIT_BYTES, MAX_LIMIT_BYTES)),
+        ),
         ..LinearReaderOptions::default()
     };
     MessageReader::new_with_options(Cursor::new(bytes), options)

@@ -86,7 +86,8 @@ struct StoredAs {
 impl StoredAs {
     /// The number of a stored integer of so many bits; unsigned ones are stored in a signed type.
     fn number(&self, stored: i64, bits: u32) -> f64 {
-        let value = if self.unsigned && stored < 0 { stored as f64 + 2_f64.powi(bits as i32) } else { stored as f64 };
+        let value =
+            if self.unsigned && stored < 0 { stored as f64 + 2_f64.powi(bits as i32) } else { stored as f64 };
         value / self.divisor
     }
 
@@ -151,7 +152,9 @@ impl NumericColumns for File {
             for group in 0..self.reader.num_row_groups() {
                 let group = self.reader.get_row_group(group).map_err(damaged)?;
                 match group.get_column_reader(index).map_err(damaged)? {
-                    ColumnReader::DoubleColumnReader(mut r) => read(&mut r, optional, (&mut out, rows), |x| *x)?,
+                    ColumnReader::DoubleColumnReader(mut r) => {
+                        read(&mut r, optional, (&mut out, rows), |x| *x)?
+                    }
                     ColumnReader::FloatColumnReader(mut r) => {
                         read(&mut r, optional, (&mut out, rows), |x| f64::from(*x))?
                     }
@@ -165,11 +168,13 @@ impl NumericColumns for File {
                         read(&mut r, optional, (&mut out, rows), |x| f64::from(u8::from(*x)))?;
                     }
                     // Nanoseconds of the day and the Julian day, as older pandas and Spark write.
-                    ColumnReader::Int96ColumnReader(mut r) => read(&mut r, optional, (&mut out, rows), |x| {
-                        let [low, high, day] = *x.data() else { return f64::NAN };
-                        let of_day = f64::from(low) + f64::from(high) * 4_294_967_296.0;
-                        (f64::from(day) - JULIAN_DAY_OF_1970) * 86_400.0 + of_day / 1e9
-                    })?,
+                    ColumnReader::Int96ColumnReader(mut r) => {
+                        read(&mut r, optional, (&mut out, rows), |x| {
+                            let [low, high, day] = *x.data() else { return f64::NAN };
+                            let of_day = f64::from(low) + f64::from(high) * 4_294_967_296.0;
+                            (f64::from(day) - JULIAN_DAY_OF_1970) * 86_400.0 + of_day / 1e9
+                        })?
+                    }
                     _ => return Err(format!("\"{name}\" is not a column of numbers")),
                 }
             }

@@ -190,7 +190,8 @@ impl<L: MessageLog> NumericColumns for Topics<L> {
         self.log.for_each(&mut |message| {
             count += 1;
             if count.is_multiple_of(MESSAGES_PER_CHECK) {
-                let needed = (count as u64).saturating_mul(wanted.len() as u64).saturating_mul(2 * VALUE_BYTES);
+                let needed =
+                    (count as u64).saturating_mul(wanted.len() as u64).saturating_mul(2 * VALUE_BYTES);
                 memory_limit::check(&format!("a log of more than {count} messages"), needed)?;
             }
             if !parts.iter().any(|(t, _)| *t == message.topic) {
