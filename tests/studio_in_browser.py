@@ -79,6 +79,30 @@ def recordings(stylet, folder):
         "attack": write(f"{ATTACK.replace('/', '_')}.csv", made[0][:400], f"time_s,position_m,force_n"),
         "attack_column": write("column.csv", [row + [0.0] for row in made[0][:400]], f"time_s,position_m,force_n,{ATTACK.replace(',', ' ')}", (1, 1, 1, 1)),
         "long": write("long.csv", long),
+        "table": made[0],
+    }
+
+
+def foreign(table):
+    """The same recording as ten other programs write it."""
+    def text(header, separator=",", scale=(1, 1, 1), units=None, before="", decimal=".", index=False):
+        rows = [header] if header else []
+        rows += [units] if units else []
+        for k, row in enumerate(table):
+            values = [repr(round(v * s, 9)).replace(".", decimal) for v, s in zip(row, scale)]
+            rows.append(separator.join(([str(k)] if index else []) + values))
+        return before + "\n".join(rows) + "\n"
+    return {
+        "semicolons.csv": text("time_s;position_m;force_n", ";"),
+        "decimal_comma.csv": text("time_s;position_m;force_n", ";", decimal=","),
+        "tabs.txt": text("time_s\tposition_m\tforce_n", "\t"),
+        "blanks.txt": text("time_s position_m force_n", " "),
+        "milliseconds.csv": text("time (ms),position (mm),force (N)", scale=(1e3, 1e3, 1)),
+        "unit_row.csv": text("time,position,force", units="s,mm,N", scale=(1, 1e3, 1)),
+        "german.csv": text("Zeit;Weg;Kraft", ";", units="s;mm;N", scale=(1, 1e3, 1), decimal=","),
+        "preamble.csv": text("time_s,position_m,force_n", before="Machine 7\nOperator: somebody\n\n"),
+        "comments.csv": text("time_s,position_m,force_n", before="# logged by a robot\n"),
+        "millinewton.csv": text("time [s],displacement [mm],force [mN]", scale=(1, 1e3, 1e3)),
     }
 
 
@@ -187,6 +211,19 @@ def walk(page, studio, files, workspace, options):
     check((workspace / "columns.ron").read_text().count("0.001") == 1, "the corrected unit is in columns.ron")
     page.get_by_role("button", name="Forget the map").click()
     page.get_by_role("button", name=re.compile("^Remove in_mm")).click()
+    for name, text in foreign(files["table"]).items():
+        path = files["a"].parent / name
+        path.write_text(text, encoding="utf-8")
+        drop(page, path)
+        page.get_by_text(re.compile(f"^{re.escape(name)}$")).first.wait_for()
+        page.keyboard.press("1")
+        page.get_by_text("samples over 37.99 s").first.wait_for()
+        page.get_by_role("button", name=f"Remove {name}").click()
+        forget = page.get_by_role("button", name="Forget the map")
+        if forget.count():
+            forget.click()
+        page.get_by_role("button", name=f"Remove {name}").wait_for(state="hidden")
+    check(True, "ten files of other programs are read without a click")
     # A long recording is drawn at once.
     begin = time.time()
     drop(page, files["long"])
@@ -199,7 +236,7 @@ def walk(page, studio, files, workspace, options):
     page.wait_for_function("() => document.getElementById('view-look').dataset.drawn?.startsWith('a.csv')")
     drop(page, files["b"])
     page.wait_for_function("() => document.getElementById('view-look').dataset.drawn?.startsWith('b.csv')")
-    page.get_by_label("Paper").check()
+    page.get_by_label("Paper", exact=True).check()
     page.get_by_role("heading", name="Paper").wait_for()
     page.get_by_role("button", name="Write results").first.click()
     page.get_by_text("written to").wait_for()

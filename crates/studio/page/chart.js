@@ -15,7 +15,7 @@ export class Chart {
   constructor(parent, { x, y, share = 0.34, label, sorted = true, legend = true }) {
     Object.assign(this, { sorted, share, hidden: new Set(), curves: [], bands: [], marks: [], partners: [], x: [] });
     this.legend = h("div", { class: "legend" });
-    this.plot = h("div", { class: "plot", role: "img", "aria-label": label });
+    this.plot = h("div", { class: "plot", role: "group", "aria-label": label });
     this.reading = h("output", { class: "reading", "aria-live": "off" });
     parent.append(h("figure", { class: "chart" }, legend && this.legend, this.plot, this.reading));
     this.u = new uPlot(this.options(x, y), [[0, 1]], this.plot);
@@ -59,6 +59,7 @@ export class Chart {
     if (!(low < high)) { low = 0; high = 1; }
     this.extent = [low, high];
     this.paintLegend();
+    this.showSample(-1);
     if (!keepRange || !this.drawn) this.reset();
     this.drawn = true;
     this.fit();
@@ -260,6 +261,7 @@ export class Chart {
   }
 
   showSample(index) {
+    if (!this.u) return;
     if (!this.dot) this.dot = this.u.over.appendChild(h("div", { class: "dot" }));
     const curve = this.visible().find(c => c.y), known = index >= 0 && curve && isNumber(curve.y[index]);
     this.dot.hidden = !known;
