@@ -137,14 +137,17 @@ fn columns(map: &ColumnMap, found: &Inspection, path: &Path) -> Vec<ColumnView> 
         let used = QUANTITIES.iter().find_map(|(quantity, units, _)| {
             let candidate = candidate(quantity);
             let mapped = column(map, quantity).filter(|m| is_column(m, candidate, c.number, &c.name))?;
-            Some((*quantity, *units, mapped.scale.or(candidate.map(|k| k.scale)).unwrap_or(1.0), candidate))
+            let same = candidate.filter(|k| k.columns.contains(&c.number));
+            let scale = mapped.scale.or(same.map(|k| k.scale)).or(c.to_si).unwrap_or(1.0);
+            Some((*quantity, *units, scale, same))
         });
         let unit = used.map(|(_, units, scale, _)| {
             let same = |size: f64| (size - scale.abs()).abs() < SAME_SCALE * size;
             let known = units.iter().find(|(_, size)| same(*size));
             known.map_or(format!("× {}", significant(scale.abs(), 4)), |(unit, _)| (*unit).to_owned())
         });
-        let sketch = sketches.as_ref().and_then(|s| s.get(c.number - 1)).cloned().unwrap_or_default();
+        let sketch =
+            sketches.as_ref().and_then(|s| s.get(c.number.checked_sub(1)?)).cloned().unwrap_or_default();
         ColumnView {
             name: c.name.clone(),
             quantity: used.map_or("", |(quantity, ..)| quantity),
@@ -163,6 +166,7 @@ fn columns(map: &ColumnMap, found: &Inspection, path: &Path) -> Vec<ColumnView> 
 /// Adopts the proposed map for a file that cannot be read without one, so that only wrong guesses need a click.
 pub fn adopt_proposal(studio: &mut Studio, file: &str) -> Result<(), Problem> {
     if studio.now.map.is_none()
+        && studio.recording(file).is_err()
         && let Ok(found) = inspect_file(studio.workspace.data(file)?, &InspectOptions::default())
         && found.map_needed
         && found.map.check().is_ok()
@@ -178,14 +182,19 @@ pub fn set_column(studio: &mut Studio, request: ColumnRequest) -> Result<Inspect
     let found = inspect_file(studio.workspace.data(&request.file)?, &options);
     let found = found.map_err(|why| Problem::new(why.to_string()))?;
     let gone = || Problem::new(format!("the file has no column {:?}", request.column));
-    let number = found.columns.iter().find(|c| c.name == request.column).ok_or_else(gone)?.number;
+    let in_file = found.columns.iter().find(|c| c.name == request.column).ok_or_else(gone)?;
+    let (number, of_file) = (in_file.number, in_file.to_si);
     let named = found.text.as_ref().is_none_or(|text| text.names_line.is_some());
     let mut map = studio.now.map.clone().unwrap_or_else(|| found.map.clone());
     for (quantity, units, _) in QUANTITIES {
         let candidate = found.candidates.iter().find(|k| k.role.name() == quantity);
         if quantity == request.quantity {
-            let size = units.iter().find(|(unit, _)| *unit == request.unit).map_or(1.0, |(_, size)| *size);
-            let scale = Some(if request.flipped { -size } else { size });
+            let given = units.iter().find(|(unit, _)| *unit == request.unit).map(|(_, size)| *size);
+            // Without a unit that of the file counts.
+            let scale = match request.flipped {
+                true => Some(-given.or(of_file).unwrap_or(1.0)),
+                false => given,
+            };
             let chosen = match named {
                 true => Column { name: request.column.clone(), scale, ..Column::default() },
                 false => Column { column: Some(number), scale, ..Column::default() },

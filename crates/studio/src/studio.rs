@@ -140,7 +140,12 @@ impl Studio {
         let name = self.workspace.add(name, from)?;
         self.forget_recordings();
         open::adopt_proposal(self, &name)?;
-        json(&open::inspect(self, &name)?)
+        let found = open::inspect(self, &name);
+        if found.is_err() {
+            // Nothing that the page could show.
+            self.workspace.remove(&name)?;
+        }
+        json(&found?)
     }
 
     /// Content of a result file.
