@@ -2,27 +2,17 @@
 //! other files.
 
 use crate::columns::{ColumnRole, MappedColumn, MappedColumns, Parts};
-use crate::csv_reader::{ReadOptions, Select, read_bytes, with_table};
 use crate::differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
 use crate::error::RecordError;
 use crate::insertion_axis::{fit_axis, project};
 use crate::inspect::magnitude::epoch_unit;
 use crate::quality::{QualityKind, QualityNote};
 use crate::recording::{JOINTS, Recording};
+use crate::table_source::{RawTable, ReadOptions, Select, read_bytes, with_table};
 use crate::text::layout::ColumnKind;
 use crate::text::rows::RowsRead;
 use crate::text::source::SourceFile;
 use crate::time_order::{self, retain_rows};
-
-/// Columns as a file has them: parts of the mapped columns one after another, NaN for missing values.
-#[derive(Debug, Default)]
-pub(crate) struct RawTable {
-    pub columns: Vec<Vec<f64>>,
-    /// Where each row begins.
-    pub offsets: Vec<usize>,
-    pub mapped: MappedColumns,
-    pub read: RowsRead,
-}
 
 /// Rows that remain at least where others lack a value.
 const MIN_ROWS: usize = 3;

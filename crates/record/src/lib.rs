@@ -52,6 +52,7 @@ pub mod memory_limit;
 mod quality;
 pub mod recording;
 mod sample_stream;
+mod table_source;
 #[cfg(test)]
 mod test_noise;
 mod text;
@@ -59,7 +60,7 @@ mod time_order;
 pub mod units;
 
 pub use column_map::{Column, ColumnMap};
-pub use csv_reader::{ReadOptions, read_csv, read_csv_bytes};
+pub use csv_reader::{read_csv, read_csv_bytes};
 pub use csv_writer::{RowWriter, write_csv};
 pub use differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
 pub use downsample::downsample;
@@ -71,6 +72,7 @@ pub use quality::{
     sensor_artefacts,
 };
 pub use recording::{JOINTS, Recording, Sample};
+pub use table_source::ReadOptions;
 
 /// Compiles the examples of the README.
 #[cfg(doctest)]

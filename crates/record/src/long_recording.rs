@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 
 use crate::assemble::{check_sample_count, hole_note, unit_notes};
 use crate::columns::{ColumnRole, MappedColumns, Parts, joint_torque_name};
-use crate::csv_reader::{ReadOptions, wanted_fields};
 use crate::differentiate::{DEFAULT_HALF_WIDTH_S, SlopeFilter};
 use crate::disk_table::{BLOCK_ROWS, DiskTable, DiskTableWriter, ExternalSort};
 use crate::error::RecordError;
@@ -19,6 +18,7 @@ use crate::inspect::{InspectOptions, inspect};
 use crate::quality::{QualityNote, assess_stream, repaired_rows};
 use crate::recording::Sample;
 use crate::sample_stream::{Quantity, SampleStream, SortedValues};
+use crate::table_source::{ReadOptions, wanted_fields};
 use crate::text::encoding;
 use crate::text::find::find_table;
 use crate::text::rows::{Tolerance, read_rows};

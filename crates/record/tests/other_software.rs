@@ -1,5 +1,6 @@
 //! Promise: files that other software wrote (`foreign/make_tables.py`) give the insertion that they hold, and damaged ones an
 //! error; `inspect` proposes a map with which they are read.
+#![allow(clippy::panic)] // with the name of the case
 #![cfg(feature = "formats")]
 
 use std::path::{Path, PathBuf};

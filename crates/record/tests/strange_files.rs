@@ -1,5 +1,6 @@
 //! Promise: a file as an instrument writes it is read, or refused with all obstacles and the remedy: one case of every kind with
 //! fixed parameters, and more with parameters that are drawn from a seed.
+#![allow(clippy::panic)] // with the name of the case
 
 use std::fmt::Write as _;
 use std::path::Path;

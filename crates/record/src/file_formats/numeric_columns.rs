@@ -22,6 +22,9 @@ impl NamedColumn {
     }
 }
 
+/// A column that was read: name and values.
+pub(crate) type NamedValues = (String, Vec<f64>);
+
 /// A file with named columns of numbers.
 pub(crate) trait NumericColumns {
     /// All columns, in the order of the file.
@@ -108,10 +111,7 @@ impl ColumnsOfFile<'_> {
     }
 
     /// As many of the columns as have the most frequent length, and sentences on the others.
-    pub(crate) fn read_equal(
-        &self,
-        wanted: &[&str],
-    ) -> Result<(Vec<(String, Vec<f64>)>, Vec<String>), RecordError> {
+    pub(crate) fn read_equal(&self, wanted: &[&str]) -> Result<(Vec<NamedValues>, Vec<String>), RecordError> {
         let main = wanted.first().copied().unwrap_or_default();
         let columns = catch_unwind(AssertUnwindSafe(|| {
             // A damaged column does not hide the others.

@@ -1,9 +1,9 @@
 //! Findings of an inspection: obstacles for the readers, and remarks.
 
 use super::candidates::{Chosen, si_symbol};
+use super::facts::{FileFacts, Rows};
 use super::magnitude::{epoch_unit, in_words};
 use super::scan::Scan;
-use super::source::{FileFacts, Rows};
 use super::{Finding, Role, Sampling};
 use crate::columns::TableHead;
 use crate::error::RecordError;

@@ -1,12 +1,13 @@
 //! Rows of a file for the inspection, from text in pieces or from columns in memory.
 
+use super::facts::{FileFacts, Rows};
 use super::scan::{Scan, ThinnedCurves};
 use super::{InspectOptions, InspectedColumn, Inspection, TextFacts, candidates, findings, sampling};
 use crate::column_map::ColumnMap;
 use crate::columns::TableHead;
-use crate::csv_reader::{decoded, read_bytes};
 use crate::error::RecordError;
 use crate::file_formats::{FileFormat, Foreign};
+use crate::table_source::{decoded, read_bytes};
 use crate::text::encoding;
 use crate::text::find::inspect_layout;
 use crate::text::layout::{ColumnKind, TextLayout};
@@ -22,15 +23,6 @@ use std::path::Path;
 const HEAD_BYTES: u64 = 1 << 18;
 /// Most columns that are inspected.
 const MAX_COLUMNS: usize = 512;
-
-/// A table that can be read several times.
-pub(super) trait Rows {
-    /// Calls `each` with the offset and the values of every row, one per column, NaN for missing ones.
-    fn for_each(&self, each: &mut dyn FnMut(usize, &[f64])) -> Result<RowsRead, RecordError>;
-
-    /// Lines of ascending offsets.
-    fn lines(&self, offsets: &[usize]) -> Result<Vec<u64>, RecordError>;
-}
 
 struct TextRows<'a> {
     file: SourceFile<'a>,
@@ -82,19 +74,12 @@ impl Rows for ColumnRows {
     }
 }
 
-/// Facts about a file that do not come from its rows.
-pub(super) struct FileFacts<'a> {
-    pub path: &'a Path,
-    pub format: String,
-    pub bytes: u64,
-    pub text: Option<TextFacts>,
-    /// Parts of the file that cannot be read, as sentences.
-    pub unreadable: Vec<String>,
-    /// A number such as `1,234` when nothing decides between decimal comma and thousands.
-    pub open_decimal: Option<String>,
-}
-
-pub(super) fn inspect_file(path: &Path, options: &InspectOptions) -> Result<Inspection, RecordError> {
+/// Inspects a file. Text tables are read in pieces: memory does not grow with their columns.
+///
+/// # Errors
+/// [`RecordError`] when the file cannot be read at all: missing, empty, neither text nor a known format, damaged.
+pub fn inspect(path: impl AsRef<Path>, options: &InspectOptions) -> Result<Inspection, RecordError> {
+    let path = path.as_ref();
     let unreadable = |source: std::io::Error| match source.kind() {
         std::io::ErrorKind::NotFound => RecordError::NoSuchFile { path: path.to_owned() },
         _ => RecordError::Unreadable { path: path.to_owned(), source },
@@ -145,11 +130,11 @@ pub(super) fn inspect_file(path: &Path, options: &InspectOptions) -> Result<Insp
     inspect_text(text, head, encoding.name(), ("text table".to_owned(), metadata.len()), path, map)
 }
 
-pub(super) fn inspect_bytes(
-    bytes: &[u8],
-    path: &Path,
-    options: &InspectOptions,
-) -> Result<Inspection, RecordError> {
+/// Inspects the bytes of a file. `path` appears in messages.
+///
+/// # Errors
+/// As [`inspect`].
+pub fn inspect_bytes(bytes: &[u8], path: &Path, options: &InspectOptions) -> Result<Inspection, RecordError> {
     let map = options.columns.as_ref();
     let size = bytes.len() as u64;
     match FileFormat::detect(bytes) {

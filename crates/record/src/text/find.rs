@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::layout::{DELIMITERS, Delimiter, LayoutHints, TextLayout, find_layout, is_row_of_units, split};
+use super::delimiter::{DELIMITERS, Delimiter, split};
+use super::layout::{LayoutHints, TextLayout, find_layout, is_row_of_units};
 use crate::column_map::ColumnMap;
 use crate::columns::{MappedColumns, TableHead, map_columns};
 use crate::error::RecordError;

@@ -1,5 +1,6 @@
 //! Text tables: encoding, layout, rows.
 
+pub(crate) mod delimiter;
 pub(crate) mod encoding;
 pub(crate) mod find;
 pub(crate) mod layout;

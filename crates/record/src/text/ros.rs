@@ -1,6 +1,6 @@
 //! Text that ROS prints: `ros2 topic echo --csv`, which has no names, and `rostopic echo -p`.
 
-use super::layout::{Delimiter, split};
+use super::delimiter::{Delimiter, split};
 use crate::units::{Unit, parse_unit};
 
 /// Names of the fields behind the header of a stamped message.

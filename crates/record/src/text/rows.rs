@@ -2,7 +2,8 @@
 
 use std::io::{BufRead, BufReader, Read};
 
-use super::layout::{ColumnKind, Delimiter, TextLayout, split};
+use super::delimiter::{Delimiter, split};
+use super::layout::{ColumnKind, TextLayout};
 use super::number::{is_missing, parse_date_ns, parse_number};
 use super::source::{CHUNK_BYTES, SourceFile};
 use crate::error::RecordError;
