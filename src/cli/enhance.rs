@@ -9,7 +9,7 @@ use stylet_api::enhancement::{
 use stylet_api::output_folder::check_folder;
 use stylet_api::{IdentifiedModel, OutputLock, read_options, resource_estimate};
 use stylet_core::config::Model;
-use stylet_record::{read_csv, read_long_csv};
+use stylet_record::{QualityKind, QualityNote, read_csv, read_long_csv};
 use stylet_report::{plus_minus, significant};
 use stylet_scenario::EnhancerConfigFile;
 
@@ -43,6 +43,7 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
         args.limits.check(&args.data, &estimate, args.results.quiet)?;
         let lock = OutputLock::new(&folder)?;
         if let Some((recording, notes)) = read_long_csv(&args.data, &options, &folder)? {
+            refuse_grave(args, &notes)?;
             let result =
                 enhance_long_recording(&recording, notes, config, &regressors, model.as_ref(), &lock)?;
             let summary = summary(args, &result);
@@ -56,9 +57,20 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
     let (recording, notes) = read_csv(&args.data, &options)?;
     let estimate = resource_estimate::estimate_enhance_samples(recording.len() as f64, regressors.len());
     args.limits.check(&args.data, &estimate, true)?;
+    refuse_grave(args, &notes)?;
     let result = enhance_recording(recording, notes, config, &regressors, model.as_ref())?;
     let summary = summary(args, &result);
     args.results.write_and_print(&folder, &result.output_files(&source)?.with_inputs(inputs), || summary)
+}
+
+/// Every number from a recording with the wrong sign or unit would be wrong.
+fn refuse_grave(args: &EnhanceArgs, notes: &[QualityNote]) -> Result<(), Failure> {
+    let grave =
+        |kind| matches!(kind, QualityKind::Reversed | QualityKind::ReversedPosition | QualityKind::UnitMixUp);
+    match notes.iter().find(|note| note.blocking && grave(note.kind)) {
+        Some(note) => Err(Failure::Check(format!("{}: {}", args.data.display(), note.message))),
+        None => Ok(()),
+    }
 }
 
 fn command(args: &EnhanceArgs) -> String {

@@ -1,10 +1,11 @@
 //! The online core: one of the algorithms behind one interface.
 
-use crate::config::{Algorithm, EnhanceConfig};
+use crate::config::{Algorithm, EnhanceConfig, Model};
 use crate::kalman::KalmanEnhancer;
 use crate::paper::PaperEnhancer;
 use crate::sample::{Output, Sample, UnusedReason};
 use crate::sample_clock::{SampleClock, Verdict};
+use crate::units::Units;
 
 /// Samples that are checked ahead of the algorithm in [`Enhancer::run`].
 const BLOCK_SAMPLES: usize = 64;
@@ -24,12 +25,22 @@ pub struct Enhancer<B> {
     kalman: Option<KalmanEnhancer>,
     clock: SampleClock,
     surface_m: f64,
+    units: Units,
+    /// The last output in m and N, where the units are others.
+    converted: Output,
 }
 
 impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     /// A core with `storage` for the raw samples of a layer. `surface_m` is the position of the tissue surface, used with
     /// [`Contact::Known`](crate::config::Contact::Known).
     pub fn new(config: EnhanceConfig, surface_m: f64, storage: B) -> Self {
+        Self::with_units(config, surface_m, Units::default(), storage)
+    }
+
+    /// As [`Enhancer::new`] for a needle or forces of another size: the lengths and forces of configuration and constants are in
+    /// these units, samples, surface and outputs in m and N.
+    pub fn with_units(config: EnhanceConfig, surface_m: f64, units: Units, storage: B) -> Self {
+        let surface_m = surface_m / units.length_m;
         let kalman =
             (config.active_algorithm() == Algorithm::Stylet).then(|| KalmanEnhancer::new(&config, surface_m));
         Self {
@@ -37,6 +48,8 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             kalman,
             clock: SampleClock::default(),
             surface_m,
+            units,
+            converted: Output::default(),
         }
     }
 
@@ -54,17 +67,42 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     /// clock, at which it is re-initialised ([`Output::restarted`]). A single wrong time stamp has no effect.
     #[inline]
     pub fn step(&mut self, sample: Sample) -> Output {
-        self.step_brief(sample);
-        match &mut self.kalman {
-            Some(kalman) => *kalman.complete_output(&sample),
-            None => *self.paper.complete_output(&sample),
+        if !self.units.are_si() {
+            return self.step_converted(&sample);
         }
+        self.step_in_units(sample);
+        self.complete(&sample)
+    }
+
+    #[inline]
+    fn complete(&mut self, sample: &Sample) -> Output {
+        match &mut self.kalman {
+            Some(kalman) => *kalman.complete_output(sample),
+            None => *self.paper.complete_output(sample),
+        }
+    }
+
+    #[cold]
+    fn step_converted(&mut self, sample: &Sample) -> Output {
+        let scaled = self.units.sample(sample);
+        self.step_in_units(scaled);
+        let out = self.complete(&scaled);
+        self.units.output(&out, self.config().model == Model::MultiLayer)
     }
 
     /// As [`Enhancer::step`] without a copy of the output, of which only enhanced force, innovation, state, ruptures, contact,
     /// detection, estimate, `used`, `unused_reason` and `restarted` are updated.
     #[inline]
     pub fn step_brief(&mut self, sample: Sample) -> &Output {
+        if !self.units.are_si() {
+            self.converted = self.step_converted(&sample);
+            return &self.converted;
+        }
+        self.step_in_units(sample)
+    }
+
+    #[inline]
+    fn step_in_units(&mut self, sample: Sample) -> &Output {
         let before_s = self.clock.last_s();
         match self.check(&sample) {
             Verdict::Ignore(why) => self.ignore(why),
@@ -87,6 +125,13 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     /// sample and returns the last one.
     #[inline]
     pub fn run(&mut self, samples: &[Sample], mut each: impl FnMut(&Output)) -> &Output {
+        if !self.units.are_si() {
+            for sample in samples {
+                self.converted = self.step_converted(sample);
+                each(&self.converted);
+            }
+            return &self.converted;
+        }
         if self.kalman.is_some() {
             for sample in samples {
                 each(self.step_brief(*sample));
@@ -158,7 +203,10 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     /// other algorithms.
     pub fn apply_model_friction(&mut self, friction_n: f64) -> Option<(f64, [f64; 2])> {
         let config = self.paper.config();
-        self.kalman.as_mut().and_then(|kalman| kalman.apply_model_friction(config, friction_n))
+        let unit_n = self.units.force_n;
+        let kalman = self.kalman.as_mut()?;
+        let (enhanced_n, band) = kalman.apply_model_friction(config, friction_n / unit_n)?;
+        Some((unit_n * enhanced_n, band.map(|n| unit_n * n)))
     }
 
     /// The state is finite and every covariance positive definite; for tests and monitors. `Stylet` restarts filters that

@@ -26,6 +26,7 @@ mod kalman;
 mod paper;
 mod sample;
 mod sample_clock;
+mod units;
 
 pub use config::EnhanceConfig;
 pub use enhancer::Enhancer;
@@ -35,6 +36,8 @@ pub use sample::{
     Baseline, BaselineKind, Cause, Detection, LayerEstimate, MAX_LAYERS, Output, Sample, State, UnusedReason,
     ZeroStep,
 };
+
+pub use units::Units;
 
 /// The example of the README.
 #[cfg(doctest)]

@@ -1,12 +1,12 @@
 //! Outputs of the online core over a recording, as columns.
 
 use crate::contact_finding::{ContactAssessor, ContactFinding};
-use crate::enhancer_with_model::{EnhancerWithModel, enhancer_for};
+use crate::enhancer_with_model::{EnhancerWithModel, RecordingScale, enhancer_in_units};
 use crate::offline_least_squares::{LayerSample, OfflineEstimate, fit_layer_offline};
 use crate::score::Score;
 use crate::scorer::{Scorer, TrueSample};
 use stylet_core::config::{Algorithm, EnhanceConfig, Model};
-use stylet_core::{Baseline, Detection, LayerEstimate, Sample, State, UnusedReason, ZeroStep};
+use stylet_core::{Baseline, Detection, Enhancer, LayerEstimate, Sample, State, UnusedReason, ZeroStep};
 use stylet_record::LayerTruth;
 use stylet_record::{Recording, Truth};
 
@@ -71,7 +71,7 @@ impl Trace {
         surface_m: f64,
         each: impl FnMut(usize, &stylet_core::Output),
     ) -> Self {
-        let core = enhancer_for(recording.len(), config, surface_m);
+        let core = core_for(recording, force_n, config, surface_m);
         let core = EnhancerWithModel::new(core, None::<fn(&Sample, usize) -> f64>);
         Self::collect(recording, force_n, core, each)
     }
@@ -85,7 +85,7 @@ impl Trace {
         surface_m: f64,
         model: impl FnMut(&Sample, usize) -> f64,
     ) -> Self {
-        let core = enhancer_for(recording.len(), config, surface_m);
+        let core = core_for(recording, force_n, config, surface_m);
         Self::collect(recording, force_n, EnhancerWithModel::new(core, Some(model)), |_, _| {})
     }
 
@@ -187,6 +187,20 @@ impl Trace {
         // Without a measured drop an inseparable split is undetermined.
         found.filter(|f| f.separable || estimate.is_some())
     }
+}
+
+/// The core in units that fit the recording.
+fn core_for(
+    recording: &Recording,
+    force_n: &[f64],
+    config: &EnhanceConfig,
+    surface_m: f64,
+) -> Enhancer<Vec<Sample>> {
+    let mut scale = RecordingScale::default();
+    for (z, f) in recording.position_m.iter().zip(force_n) {
+        scale.push(*z, *f);
+    }
+    enhancer_in_units(recording.len(), config, surface_m, scale.units())
 }
 
 /// Stiffness in N/m and friction in the model's unit; NaN before contact.

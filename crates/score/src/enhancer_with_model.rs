@@ -1,7 +1,7 @@
 //! The online core with or without an identified model of the shaft friction.
 
 use stylet_core::config::EnhanceConfig;
-use stylet_core::{Enhancer, Output, Sample};
+use stylet_core::{Enhancer, Output, Sample, Units};
 
 /// Most raw samples of a layer that the core stores for its replay.
 pub const MAX_STORED_SAMPLES: usize = 1 << 18;
@@ -26,6 +26,48 @@ fn without_values(out: Output) -> Output {
         band_n: None,
         sd: [f64::NAN; 3],
         ..out
+    }
+}
+
+/// As [`enhancer_for`] in units that fit the recording.
+#[must_use]
+pub fn enhancer_in_units(
+    samples: usize,
+    config: &EnhanceConfig,
+    surface_m: f64,
+    units: Units,
+) -> Enhancer<Vec<Sample>> {
+    let storage = vec![Sample::default(); samples.min(MAX_STORED_SAMPLES)];
+    Enhancer::with_units(config.clone(), surface_m, units, storage)
+}
+
+/// Travel and mean absolute change of the force since the first sample, for the choice of [`Units`].
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RecordingScale {
+    first_n: f64,
+    change_n: f64,
+    span_m: [f64; 2],
+    count: f64,
+}
+
+impl RecordingScale {
+    /// Takes a sample; values that are not finite do not count.
+    pub fn push(&mut self, position_m: f64, force_n: f64) {
+        if !(position_m.is_finite() && force_n.is_finite()) {
+            return;
+        }
+        if self.count == 0.0 {
+            (self.first_n, self.span_m) = (force_n, [position_m; 2]);
+        }
+        self.count += 1.0;
+        self.change_n += ((force_n - self.first_n).abs() - self.change_n) / self.count;
+        self.span_m = [self.span_m[0].min(position_m), self.span_m[1].max(position_m)];
+    }
+
+    /// Units that fit.
+    #[must_use]
+    pub fn units(&self) -> Units {
+        Units::for_extent(self.span_m[1] - self.span_m[0], self.change_n)
     }
 }
 

@@ -13,7 +13,9 @@ mod scorer;
 
 pub use contact_finding::{ContactAssessor, ContactFinding, ContactHypothesis};
 pub use enhancement_trace::{Trace, algorithm_name, coefficients, model_name, score_run};
-pub use enhancer_with_model::{EnhancerWithModel, MAX_STORED_SAMPLES, enhancer_for};
+pub use enhancer_with_model::{
+    EnhancerWithModel, MAX_STORED_SAMPLES, RecordingScale, enhancer_for, enhancer_in_units,
+};
 pub use measured_score::{MeasuredRecording, MeasuredScore, ModelFrictionScore};
 pub use offline_least_squares::{LayerSample, OfflineEstimate, fit_layer_offline};
 pub use rupture_matching::{MATCH_EARLIEST_S, MATCH_LATEST_S, RuptureScore, match_ruptures};

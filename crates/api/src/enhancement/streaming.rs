@@ -16,7 +16,7 @@ use stylet_record::csv_writer::RowWriter;
 use stylet_record::disk_table::DiskTableWriter;
 use stylet_record::{LongRecording, QualityNote, Recording};
 use stylet_scenario::EnhancerConfigFile;
-use stylet_score::{ContactAssessor, EnhancerWithModel, enhancer_for};
+use stylet_score::{ContactAssessor, EnhancerWithModel, RecordingScale, enhancer_in_units};
 
 /// As [`enhance_recording`](super::enhance_recording) for a recording on disk: files and hash are bitwise the same, except the
 /// report of a recording of over 20 000 samples, which shows a selection. `enhanced.csv` is written to the locked folder at once,
@@ -36,6 +36,11 @@ pub fn enhance_long_recording(
     let samples = recording.len();
     let mut runs: Vec<_> = regressors.iter().map(|&regressor| empty_run(&config, regressor)).collect();
     let sample_hz = recording.sample_hz()?;
+    let mut scale = RecordingScale::default();
+    recording.for_each_sample(|s, _| -> Result<(), Error> {
+        scale.push(s.position_m, s.force_n);
+        Ok(())
+    })?;
     let mut enhancers: Vec<EnhancerWithModel<_>> = runs
         .iter()
         .map(|r| {
@@ -43,7 +48,10 @@ pub fn enhance_long_recording(
             let friction = shaft.map(|mut shaft| {
                 move |s: &Sample, ruptures| shaft.step(s.time_s, s.position_m, s.velocity_mps, ruptures)
             });
-            EnhancerWithModel::new(enhancer_for(samples, &r.config, config.surface_m), friction)
+            EnhancerWithModel::new(
+                enhancer_in_units(samples, &r.config, config.surface_m, scale.units()),
+                friction,
+            )
         })
         .collect();
     let hashing = HashingWriter { file: lock.stage_file("enhanced.csv")?, hash: ResultHash::default() };
@@ -105,9 +113,7 @@ pub fn enhance_long_recording(
             run.trace.contact_s = recording.first_time_beyond_s(contact_m)?;
         }
     }
-    let duration_s = recording.duration_s()?;
-    let mean_hz = samples.saturating_sub(1) as f64 / duration_s;
-    let extent = RecordingExtent { samples, duration_s, sample_hz: mean_hz };
+    let extent = RecordingExtent { samples, duration_s: recording.duration_s()?, sample_hz };
     let table = EnhancedTable::Staged(file.finish()?);
     let model = model.map(|model| AppliedModel::new(model, &runs));
     Ok(EnhancementResult {
