@@ -2,6 +2,7 @@
 //! rupture alarm, one pass, bounded work per sample. Derivation: `docs/enhancer.md`.
 
 mod air_history;
+mod air_sums;
 mod baseline;
 mod contact_detection;
 mod cusum;

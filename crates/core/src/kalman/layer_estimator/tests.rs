@@ -375,8 +375,8 @@ fn a_rupture_transforms_the_state_and_starts_a_layer_with_a_wide_prior() {
         let (g, mut passed_layers) = (estimator.belief, PassedLayers::default());
         passed_layers[1] = [0.013, 0.031, 5.0];
         let mut map = Matrix::default();
-        for i in WITHOUT_BASELINE..N {
-            map[i][i] = 1.0;
+        for (i, row) in map.iter_mut().enumerate().skip(WITHOUT_BASELINE) {
+            row[i] = 1.0;
         }
         (map[D][D], map[D][B]) = (1.0, 0.0121);
         (map[K_PREV][K], map[B_PREV][B], map[BIAS][BIAS]) = (1.0, 1.0, 1.0);
@@ -406,8 +406,8 @@ fn a_rupture_after_a_gap_resets_the_bias() {
     let (mut g, mut passed_layers) = (estimator.belief, PassedLayers::default());
     passed_layers[1] = [0.013, 0.031, 5.0];
     let mut map = Matrix::default();
-    for i in WITHOUT_BASELINE..N {
-        map[i][i] = 1.0;
+    for (i, row) in map.iter_mut().enumerate().skip(WITHOUT_BASELINE) {
+        row[i] = 1.0;
     }
     (map[D][D], map[D][B], map[K_PREV][K], map[B_PREV][B]) = (1.0, 1e-6, 1.0, 1.0);
     // The tip was not free: any part of the slope of 24.9 N/m may have been elastic.
@@ -473,8 +473,8 @@ fn the_first_layer_began_before_contact_by_force_over_slope() {
             g.update(&p_is_k_delta);
         }
         let mut map = Matrix::default();
-        for i in WITHOUT_BASELINE..N {
-            map[i][i] = 1.0;
+        for (i, row) in map.iter_mut().enumerate().skip(WITHOUT_BASELINE) {
+            row[i] = 1.0;
         }
         (map[D][K_PREV], map[D][B], map[K_PREV][K], map[B_PREV][B], map[BIAS][BIAS]) =
             (1.0, 0.0121, 1.0, 1.0, 1.0);
