@@ -26,9 +26,9 @@ const DOMINANT_FACTOR: f64 = 10.0;
 /// Rounds in which further steps are looked for in the residual.
 const RESIDUAL_ROUNDS: usize = 3;
 /// Force drops that may be steps of the zero instead of ruptures, tried one at a time.
-const MAX_ALTERNATIVES: usize = 8;
+const MAX_ALTERNATIVES: usize = 6;
 /// Rounds in which one of them changes its role.
-const MAX_EXCHANGES: usize = 4;
+const MAX_EXCHANGES: usize = 3;
 
 /// The search from the base law, and from the base law with a baseline where that pays; the better of both with the
 /// recordings it was fitted to.
@@ -103,13 +103,21 @@ impl Baseline {
         // As long as more than noise is left, a drop may be a step instead of a rupture, or the reverse.
         let exchanged = |mut best: Fitted| {
             for _ in 0..MAX_EXCHANGES {
-                if leaves_noise(&best.1, &best.2) {
+                // Where every drop has a layer, there is none too many.
+                let spare: Vec<usize> = unassigned(&candidates.drops, &best.1)
+                    .filter(|drop| !best.0.zero_steps[drop.0].contains(&drop.1))
+                    .map(|drop| drop.0)
+                    .collect();
+                if spare.is_empty() || leaves_noise(&best.1, &best.2) {
                     break;
                 }
                 let others: Vec<(f64, Fitted)> = candidates
                     .drops
-                    .par_iter()
+                    .iter()
+                    .filter(|drop| spare.contains(&drop.0))
                     .take(MAX_ALTERNATIVES)
+                    .collect::<Vec<_>>()
+                    .into_par_iter()
                     .filter_map(|drop| fitted(toggled(&best.0.zero_steps, *drop)))
                     .map(|other| (gain_of(&other, &best), other))
                     .collect();
