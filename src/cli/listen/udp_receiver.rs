@@ -93,11 +93,13 @@ struct DropCounter {
 #[cfg(target_os = "linux")]
 impl DropCounter {
     /// Bytes of the kernel's buffer that are asked for: seconds of samples at 1 kHz. The system may grant fewer.
-    const BUFFER_BYTES: usize = 1 << 22;
+    const BUFFER_BYTES: usize = 1 << 23;
 
     fn new(socket: &UdpSocket) -> Self {
         use nix::sys::socket::{setsockopt, sockopt};
-        let _ = setsockopt(socket, sockopt::RcvBuf, &Self::BUFFER_BYTES);
+        // Beyond `net.core.rmem_max` only for root.
+        let forced = setsockopt(socket, sockopt::RcvBufForce, &Self::BUFFER_BYTES);
+        let _ = forced.or_else(|_| setsockopt(socket, sockopt::RcvBuf, &Self::BUFFER_BYTES));
         let enabled = setsockopt(socket, sockopt::RxqOvfl, &1).is_ok();
         Self { enabled, last: 0, total: 0, control: nix::cmsg_space!(u32) }
     }
