@@ -2,6 +2,7 @@
 //! `STYLET_MUTATIONS_EACH=1000000 cargo test --release -p stylet-record --all-features --test mutated_files` sets the number per
 //! parser.
 
+#[allow(clippy::panic)] // with the mutation
 #[path = "../../../tests/mutated/mutate.rs"]
 mod mutate;
 

@@ -1,88 +1,29 @@
 //! Diagnosis, plan and prediction, each in a thread of its own.
 
 use crate::commands;
-use crate::job::Job;
 use crate::messages::*;
-use crate::phantom::{millimetres, segment_text, title};
+use crate::phantom_view::{segment_text, title};
 use crate::preview::{curves, rms_text};
-use crate::sliders::rounded;
+use crate::results::{DIAGNOSIS, Diagnosed, EXTENDED, Explained, Job, JobResult, Planned, diagnosis_view};
 use crate::studio::Studio;
-use crate::workspace::{LIMITS, PHANTOM, Workspace};
+use crate::workspace::{LIMITS, PHANTOM};
 use stylet_api::plan_insertion::{self, PlanReport};
 use stylet_api::prediction_files::{self, ModelOrigin};
-use stylet_api::{Diagnosis, DiagnosisInputs, Limits, Scenario, force_along_motion};
-use stylet_report::pages::diagnosis::{recording_differences, summary_sentence};
+use stylet_api::{DiagnosisInputs, Limits, Scenario, force_along_motion};
 use stylet_report::pages::formatting::significant_or_dash;
 use stylet_report::pages::prediction;
 use stylet_report::{percent, significant};
 use stylet_scenario::Motion;
 use stylet_tissue::Effect as _;
 
-const DIAGNOSIS: &str = "diagnosis";
 const PLAN: &str = "plan";
 const PREDICTION: &str = "prediction";
-const EXTENDED: &str = "diagnosis/extended.ron";
 /// Points of the curve of a planned motion.
 const MOTION_POINTS: usize = 400;
 /// Points of the curves without some of the causes.
 const MAX_POINTS: usize = 3000;
 /// Pairs of candidates that are listed.
 const MAX_PAIRS: usize = 8;
-/// Limits of the next insertion before the user changes them; the depth is that of the phantom.
-const LIMITS_AT_FIRST: Limits =
-    Limits { depth_m: 0.0, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0 };
-
-/// A finished diagnosis.
-pub struct Diagnosed {
-    pub view: DiagnosisView,
-    extended: Scenario,
-}
-
-/// A plan.
-pub struct Planned {
-    pub view: PlanView,
-    motion: Motion,
-}
-
-/// What a job gives.
-pub enum JobResult {
-    Diagnosed(Box<Diagnosed>, CommandView),
-    Planned(Box<Planned>, CommandView),
-    Predicted(PredictionView, CommandView),
-}
-
-/// The results in the workspace.
-#[derive(Default)]
-pub struct Explained {
-    pub diagnosis: Option<Diagnosed>,
-    pub plan: Option<Planned>,
-    pub prediction: Option<PredictionView>,
-}
-
-impl Explained {
-    /// The diagnosis that a workspace holds.
-    pub fn read(workspace: &Workspace) -> Self {
-        let read = || {
-            let diagnosis = serde_json::from_str(&workspace.read("diagnosis/diagnosis.json")?).ok()?;
-            let extended = Scenario::parse(EXTENDED, &workspace.read(EXTENDED)?).ok()?;
-            Some(Diagnosed { view: diagnosis_view(&diagnosis), extended })
-        };
-        Self { diagnosis: read(), ..Self::default() }
-    }
-
-    pub fn extended(&self) -> Result<Scenario, Problem> {
-        let missing = || Problem::new("there is no diagnosis yet");
-        let mut scenario = self.diagnosis.as_ref().ok_or_else(missing)?.extended.clone();
-        if scenario.name.trim().is_empty() {
-            scenario.name = "extended".to_owned();
-        }
-        Ok(scenario)
-    }
-
-    pub fn planned_motion(&self) -> Result<Motion, Problem> {
-        self.plan.as_ref().map(|p| p.motion.clone()).ok_or_else(|| Problem::new("there is no plan yet"))
-    }
-}
 
 fn failed(why: impl ToString) -> Problem {
     Problem::new(why.to_string())
@@ -147,74 +88,6 @@ pub fn start_diagnosis(studio: &mut Studio, request: FilesRequest) -> Result<Job
         Ok(JobResult::Diagnosed(Box::new(Diagnosed { view, extended: found.extended }), command))
     })?;
     Ok(begun(studio, job))
-}
-
-fn diagnosis_view(d: &Diagnosis) -> DiagnosisView {
-    let number = |x: f64| significant(x, 4);
-    let interval = |low: f64, high: f64| format!("{} to {}", number(low), number(high));
-    let causes =
-        d.causes.iter().map(|c| {
-            let mut lines = vec![format!("confidence {}", significant(c.confidence, 3))];
-            lines.extend(c.parameters.iter().map(|(path, e)| {
-                format!("{path} = {} (95 %: {})", number(e.value), interval(e.low, e.high))
-            }));
-            if !c.equivalent.is_empty() {
-                lines.push(format!("equivalent: {}", c.equivalent.join(", ")));
-            }
-            CauseView { id: c.effect.clone(), title: title(&c.effect), lines }
-        });
-    let rows = d.base_parameters.iter().map(|p| {
-        let whose = if p.layer == 0 { "tissue".to_owned() } else { format!("layer {}", p.layer) };
-        let remark = match (p.at_bound, p.changed) {
-            (true, _) => "at its bound",
-            (_, true) => "changed",
-            _ => "",
-        };
-        vec![
-            whose,
-            p.name.clone(),
-            number(p.assumed),
-            number(p.value),
-            interval(p.low, p.high),
-            remark.to_owned(),
-        ]
-    });
-    let g = &d.gain;
-    let what = if g.held_out { "on held-out recordings" } else { "on the one recording, which was fitted" };
-    let notes = d.data_quality.iter().map(|q| format!("{}: {}", q.recording, q.note.message));
-    DiagnosisView {
-        sentence: summary_sentence(d),
-        verdict: format!("{:?}", d.verdict).to_lowercase(),
-        files: g.recordings.clone(),
-        causes: causes.collect(),
-        gain: format!(
-            "Residual {what}: {} N before, {} N after; noise {} N.",
-            significant(g.rmse_before_n, 3),
-            significant(g.rmse_after_n, 3),
-            significant(g.floor_n, 3)
-        ),
-        parameters: TableView {
-            head: ["", "parameter", "assumed", "fitted", "95 %", ""].map(str::to_owned).to_vec(),
-            rows: rows.collect(),
-        },
-        notes: recording_differences(d).into_iter().chain(d.advice.iter().cloned()).chain(notes).collect(),
-        not_identifiable: d.not_identifiable.iter().map(|id| title(id)).collect(),
-        folder: DIAGNOSIS.to_owned(),
-    }
-}
-
-/// The limits of the workspace, or those at first.
-pub fn limits(studio: &Studio) -> LimitsView {
-    let kept = studio.workspace.read(LIMITS).and_then(|text| stylet_scenario::parse(LIMITS, &text).ok());
-    let depth_m = rounded(studio.now.phantom.tissue.end_m());
-    let l: Limits = kept.unwrap_or(Limits { depth_m, ..LIMITS_AT_FIRST });
-    LimitsView {
-        depth_mm: millimetres(l.depth_m),
-        speed_mm_per_s: millimetres(l.speed_mps),
-        acceleration_mm_per_s2: millimetres(l.acceleration_mps2),
-        duration_s: l.duration_s,
-        force_n: l.force_n,
-    }
 }
 
 pub fn start_plan(studio: &mut Studio, request: PlanRequest) -> Result<JobView, Problem> {

@@ -26,9 +26,6 @@ pub struct Work<T> {
     elapsed_s: f64,
 }
 
-/// The work of the studio.
-pub type Job = Work<crate::explain::JobResult>;
-
 impl<T: Send + 'static> Work<T> {
     /// Starts work; it calls the function that it is given with the name of each stage.
     ///

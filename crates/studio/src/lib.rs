@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod commands;
+mod dispatch;
 mod explain;
 mod job;
 mod look;
@@ -9,7 +10,9 @@ mod messages;
 mod open;
 mod page;
 mod phantom;
+mod phantom_view;
 mod preview;
+mod results;
 mod server;
 mod sliders;
 mod studio;

@@ -2,7 +2,7 @@
 
 use crate::commands;
 use crate::messages::*;
-use crate::phantom::millimetres;
+use crate::phantom_view::millimetres;
 use crate::preview::curves;
 use crate::studio::Studio;
 use std::sync::Arc;

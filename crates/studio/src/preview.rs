@@ -1,7 +1,7 @@
 //! The predicted force of the phantom, along its own motion or along a recorded one.
 
 use crate::messages::{Curves, EventView, ForceCurve, PreviewView, Problem};
-use crate::phantom::millimetres;
+use crate::phantom_view::millimetres;
 use crate::studio::Studio;
 use stylet_api::{Recording, Scenario, force_along_motion};
 use stylet_report::significant;

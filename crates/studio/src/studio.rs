@@ -1,13 +1,10 @@
-//! The studio: state of one workspace and the messages that change it. It knows nothing of HTTP: [`Studio::call`] maps the name and JSON body
-//! of a request to the JSON of the answer, so that another transport can serve the same page.
+//! The studio: state of one workspace. It knows nothing of HTTP: `Studio::call` maps the name and JSON body of a request to the JSON of
+//! the answer, so that another transport can serve the same page.
 
-use crate::explain::Explained;
-use crate::job::Job;
 use crate::messages::*;
+use crate::phantom_view::{self, view};
+use crate::results::{Explained, Job, limits};
 use crate::workspace::{MAP, PHANTOM, Workspace};
-use crate::{explain, look, open, phantom};
-use serde::Serialize;
-use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use stylet_api::{AlgorithmRun, ColumnMap, NamedRecording, ReadOptions, Recording, Scenario};
@@ -35,10 +32,10 @@ pub struct Snapshot {
 pub struct Studio {
     pub(crate) workspace: Workspace,
     pub(crate) now: Snapshot,
-    undo: Vec<Snapshot>,
-    redo: Vec<Snapshot>,
+    pub(crate) undo: Vec<Snapshot>,
+    pub(crate) redo: Vec<Snapshot>,
     /// Movement of the mouse that the last edit belonged to.
-    stroke: Option<u64>,
+    pub(crate) stroke: Option<u64>,
     loaded: Vec<(String, Arc<Loaded>)>,
     /// Outputs of the online algorithm for the recording shown last.
     pub(crate) enhanced: Vec<(String, Arc<AlgorithmRun>)>,
@@ -54,8 +51,8 @@ impl Studio {
     pub fn open(folder: &Path, files: &[impl AsRef<Path>]) -> Result<Self, Problem> {
         let workspace = Workspace::open(folder)?;
         let phantom = match workspace.read(PHANTOM) {
-            Some(text) => phantom::parse(PHANTOM, &text)?,
-            None => phantom::first()?,
+            Some(text) => phantom_view::parse(PHANTOM, &text)?,
+            None => phantom_view::first()?,
         };
         let map = workspace.read(MAP).map(|text| stylet_scenario::parse(MAP, &text)).transpose();
         let map = map.map_err(|why| Problem::new(why.to_string()))?;
@@ -88,66 +85,6 @@ impl Studio {
         self.workspace.root()
     }
 
-    /// Answers a message.
-    ///
-    /// # Errors
-    /// [`Problem`] with reason and remedy; the state is then unchanged.
-    pub fn call(&mut self, name: &str, body: &[u8]) -> Result<Vec<u8>, Problem> {
-        self.collect_job();
-        match name {
-            "state" => json(&self.state()?),
-            "library" => json(&phantom::library()),
-            "inspect" => json(&open::inspect(self, &required(body)?)?),
-            "column" => json(&open::set_column(self, parse(body)?)?),
-            "forget_map" => json(&open::forget_map(self)?),
-            "remove" => {
-                let file = required(body)?;
-                self.workspace.remove(&file)?;
-                self.forget_recordings();
-                json(&self.state()?)
-            }
-            "look" => json(&look::look(self, parse(body)?)?),
-            "enhance" => json(&look::write_enhancement(self, parse(body)?)?),
-            "preview" => {
-                let request: FileRequest = parse(body)?;
-                json(&phantom::preview(self, request.file.as_deref())?)
-            }
-            "edit" => json(&self.edit(parse(body)?)?),
-            "undo" => json(&self.step_back(true)?),
-            "redo" => json(&self.step_back(false)?),
-            "save" => json(&phantom::save(self)?),
-            "run" => json(&phantom::run(self)?),
-            "diagnose" => json(&explain::start_diagnosis(self, parse(body)?)?),
-            "plan" => json(&explain::start_plan(self, parse(body)?)?),
-            "predict" => json(&explain::start_prediction(self, parse(body)?)?),
-            "job" => json(&self.job.as_ref().map(|job| job.view())),
-            "cancel" => {
-                if let Some(job) = &mut self.job {
-                    job.cancel();
-                }
-                json(&self.job.as_ref().map(|job| job.view()))
-            }
-            "causes" => json(&explain::without_causes(self, parse(body)?)?),
-            _ => Err(Problem::new(format!("there is no message {name:?}"))),
-        }
-    }
-
-    /// Adds a recording to the workspace and inspects it.
-    ///
-    /// # Errors
-    /// When it cannot be stored.
-    pub fn add_file(&mut self, name: &str, from: &Path) -> Result<Vec<u8>, Problem> {
-        let name = self.workspace.add(name, from)?;
-        self.forget_recordings();
-        open::adopt_proposal(self, &name)?;
-        let found = open::inspect(self, &name);
-        if found.is_err() {
-            // Nothing that the page could show.
-            self.workspace.remove(&name)?;
-        }
-        json(&found?)
-    }
-
     /// Content of a result file.
     ///
     /// # Errors
@@ -162,7 +99,7 @@ impl Studio {
             folder: self.workspace.root().display().to_string(),
             files: self.workspace.files().to_vec(),
             map: self.now.map.as_ref().map(ColumnMap::to_ron),
-            phantom: phantom::view(&self.now.phantom)?,
+            phantom: view(&self.now.phantom)?,
             commands: self.workspace.commands().to_vec(),
             undo: self.undo.len(),
             redo: self.redo.len(),
@@ -170,26 +107,7 @@ impl Studio {
             diagnosis: self.explained.diagnosis.as_ref().map(|d| d.view.clone()),
             plan: self.explained.plan.as_ref().map(|p| p.view.clone()),
             prediction: self.explained.prediction.clone(),
-            limits: explain::limits(self),
-        })
-    }
-
-    fn edit(&mut self, request: EditRequest) -> Result<EditView, Problem> {
-        let changed = phantom::edited(self, &request.edit)?;
-        let same_stroke = request.stroke.is_some() && request.stroke == self.stroke;
-        let moved = changed != self.now.phantom;
-        let stroke = if moved || same_stroke { request.stroke } else { None };
-        self.change(Snapshot { phantom: changed, ..self.now.clone() }, !same_stroke, !request.transient)?;
-        self.stroke = stroke;
-        self.edit_view(request.along.as_deref())
-    }
-
-    fn edit_view(&mut self, along: Option<&str>) -> Result<EditView, Problem> {
-        Ok(EditView {
-            preview: phantom::preview(self, along)?,
-            phantom: phantom::view(&self.now.phantom)?,
-            undo: self.undo.len(),
-            redo: self.redo.len(),
+            limits: limits(&self.workspace, &self.now.phantom),
         })
     }
 
@@ -205,7 +123,7 @@ impl Studio {
         self.set(to, keep)
     }
 
-    fn set(&mut self, to: Snapshot, keep: bool) -> Result<(), Problem> {
+    pub(crate) fn set(&mut self, to: Snapshot, keep: bool) -> Result<(), Problem> {
         if to.map != self.now.map {
             self.forget_recordings();
         }
@@ -215,7 +133,7 @@ impl Studio {
 
     /// Writes phantom and map.
     pub(crate) fn keep(&self) -> Result<(), Problem> {
-        self.workspace.write(PHANTOM, phantom::ron(&self.now.phantom)?.as_bytes())?;
+        self.workspace.write(PHANTOM, phantom_view::ron(&self.now.phantom)?.as_bytes())?;
         match &self.now.map {
             Some(map) => self.workspace.write(MAP, map.to_ron().as_bytes()),
             None => {
@@ -226,7 +144,7 @@ impl Studio {
         }
     }
 
-    fn step_back(&mut self, back: bool) -> Result<StateView, Problem> {
+    pub(crate) fn step_back(&mut self, back: bool) -> Result<StateView, Problem> {
         let (from, to) =
             if back { (&mut self.undo, &mut self.redo) } else { (&mut self.redo, &mut self.undo) };
         if let Some(snapshot) = from.pop() {
@@ -237,7 +155,7 @@ impl Studio {
         self.state()
     }
 
-    fn forget_recordings(&mut self) {
+    pub(crate) fn forget_recordings(&mut self) {
         self.loaded.clear();
         self.enhanced.clear();
     }
@@ -268,24 +186,4 @@ impl Studio {
         self.loaded.push((file.to_owned(), loaded.clone()));
         Ok(loaded)
     }
-
-    fn collect_job(&mut self) {
-        if let Some(result) = self.job.as_mut().and_then(|job| job.take_result()) {
-            explain::collect(self, result);
-        }
-    }
-}
-
-fn json(value: &impl Serialize) -> Result<Vec<u8>, Problem> {
-    serde_json::to_vec(value).map_err(|why| Problem::new(format!("internal error: {why}; please report it")))
-}
-
-fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
-    serde_json::from_slice(body).map_err(|why| Problem::new(format!("the message is invalid: {why}")))
-}
-
-/// The recording that a message must name.
-fn required(body: &[u8]) -> Result<String, Problem> {
-    let request: FileRequest = parse(body)?;
-    request.file.ok_or_else(|| Problem::new("the message names no recording"))
 }

@@ -1,0 +1,111 @@
+//! The messages: name and JSON body of a request to the JSON of the answer.
+
+use crate::messages::*;
+use crate::phantom_view::view;
+use crate::preview::preview;
+use crate::studio::{Snapshot, Studio};
+use crate::{explain, look, open, phantom};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::path::Path;
+
+impl Studio {
+    /// Answers a message.
+    ///
+    /// # Errors
+    /// [`Problem`] with reason and remedy; the state is then unchanged.
+    pub fn call(&mut self, name: &str, body: &[u8]) -> Result<Vec<u8>, Problem> {
+        self.collect_job();
+        match name {
+            "state" => json(&self.state()?),
+            "library" => json(&phantom::library()),
+            "inspect" => json(&open::inspect(self, &required(body)?)?),
+            "column" => json(&open::set_column(self, parse(body)?)?),
+            "forget_map" => json(&open::forget_map(self)?),
+            "remove" => {
+                let file = required(body)?;
+                self.workspace.remove(&file)?;
+                self.forget_recordings();
+                json(&self.state()?)
+            }
+            "look" => json(&look::look(self, parse(body)?)?),
+            "enhance" => json(&look::write_enhancement(self, parse(body)?)?),
+            "preview" => {
+                let request: FileRequest = parse(body)?;
+                json(&preview(self, request.file.as_deref())?)
+            }
+            "edit" => json(&self.edit(parse(body)?)?),
+            "undo" => json(&self.step_back(true)?),
+            "redo" => json(&self.step_back(false)?),
+            "save" => json(&phantom::save(self)?),
+            "run" => json(&phantom::run(self)?),
+            "diagnose" => json(&explain::start_diagnosis(self, parse(body)?)?),
+            "plan" => json(&explain::start_plan(self, parse(body)?)?),
+            "predict" => json(&explain::start_prediction(self, parse(body)?)?),
+            "job" => json(&self.job.as_ref().map(|job| job.view())),
+            "cancel" => {
+                if let Some(job) = &mut self.job {
+                    job.cancel();
+                }
+                json(&self.job.as_ref().map(|job| job.view()))
+            }
+            "causes" => json(&explain::without_causes(self, parse(body)?)?),
+            _ => Err(Problem::new(format!("there is no message {name:?}"))),
+        }
+    }
+
+    /// Adds a recording to the workspace and inspects it.
+    ///
+    /// # Errors
+    /// When it cannot be stored.
+    pub fn add_file(&mut self, name: &str, from: &Path) -> Result<Vec<u8>, Problem> {
+        let name = self.workspace.add(name, from)?;
+        self.forget_recordings();
+        open::adopt_proposal(self, &name)?;
+        let found = open::inspect(self, &name);
+        if found.is_err() {
+            // Nothing that the page could show.
+            self.workspace.remove(&name)?;
+        }
+        json(&found?)
+    }
+
+    fn edit(&mut self, request: EditRequest) -> Result<EditView, Problem> {
+        let changed = phantom::edited(self, &request.edit)?;
+        let same_stroke = request.stroke.is_some() && request.stroke == self.stroke;
+        let moved = changed != self.now.phantom;
+        let stroke = if moved || same_stroke { request.stroke } else { None };
+        self.change(Snapshot { phantom: changed, ..self.now.clone() }, !same_stroke, !request.transient)?;
+        self.stroke = stroke;
+        self.edit_view(request.along.as_deref())
+    }
+
+    fn edit_view(&mut self, along: Option<&str>) -> Result<EditView, Problem> {
+        Ok(EditView {
+            preview: preview(self, along)?,
+            phantom: view(&self.now.phantom)?,
+            undo: self.undo.len(),
+            redo: self.redo.len(),
+        })
+    }
+
+    fn collect_job(&mut self) {
+        if let Some(result) = self.job.as_mut().and_then(|job| job.take_result()) {
+            explain::collect(self, result);
+        }
+    }
+}
+
+fn json(value: &impl Serialize) -> Result<Vec<u8>, Problem> {
+    serde_json::to_vec(value).map_err(|why| Problem::new(format!("internal error: {why}; please report it")))
+}
+
+fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {
+    serde_json::from_slice(body).map_err(|why| Problem::new(format!("the message is invalid: {why}")))
+}
+
+/// The recording that a message must name.
+fn required(body: &[u8]) -> Result<String, Problem> {
+    let request: FileRequest = parse(body)?;
+    request.file.ok_or_else(|| Problem::new("the message names no recording"))
+}

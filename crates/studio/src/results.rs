@@ -1,0 +1,140 @@
+//! Results of the workspace: diagnosis, plan, prediction, and how the page shows a diagnosis.
+
+use crate::job::Work;
+use crate::messages::*;
+use crate::phantom_view::{millimetres, title};
+use crate::sliders::rounded;
+use crate::workspace::{LIMITS, Workspace};
+use stylet_api::{Diagnosis, Limits, Scenario};
+use stylet_report::pages::diagnosis::{recording_differences, summary_sentence};
+use stylet_report::significant;
+use stylet_scenario::Motion;
+
+pub const DIAGNOSIS: &str = "diagnosis";
+pub const EXTENDED: &str = "diagnosis/extended.ron";
+/// Limits of the next insertion before the user changes them; the depth is that of the phantom.
+const LIMITS_AT_FIRST: Limits =
+    Limits { depth_m: 0.0, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0 };
+
+/// The work of the studio.
+pub type Job = Work<JobResult>;
+
+/// A finished diagnosis.
+pub struct Diagnosed {
+    pub view: DiagnosisView,
+    pub extended: Scenario,
+}
+
+/// A plan.
+pub struct Planned {
+    pub view: PlanView,
+    pub motion: Motion,
+}
+
+/// What a job gives.
+pub enum JobResult {
+    Diagnosed(Box<Diagnosed>, CommandView),
+    Planned(Box<Planned>, CommandView),
+    Predicted(PredictionView, CommandView),
+}
+
+/// The results in the workspace.
+#[derive(Default)]
+pub struct Explained {
+    pub diagnosis: Option<Diagnosed>,
+    pub plan: Option<Planned>,
+    pub prediction: Option<PredictionView>,
+}
+
+impl Explained {
+    /// The diagnosis that a workspace holds.
+    pub fn read(workspace: &Workspace) -> Self {
+        let read = || {
+            let diagnosis = serde_json::from_str(&workspace.read("diagnosis/diagnosis.json")?).ok()?;
+            let extended = Scenario::parse(EXTENDED, &workspace.read(EXTENDED)?).ok()?;
+            Some(Diagnosed { view: diagnosis_view(&diagnosis), extended })
+        };
+        Self { diagnosis: read(), ..Self::default() }
+    }
+
+    pub fn extended(&self) -> Result<Scenario, Problem> {
+        let missing = || Problem::new("there is no diagnosis yet");
+        let mut scenario = self.diagnosis.as_ref().ok_or_else(missing)?.extended.clone();
+        if scenario.name.trim().is_empty() {
+            scenario.name = "extended".to_owned();
+        }
+        Ok(scenario)
+    }
+
+    pub fn planned_motion(&self) -> Result<Motion, Problem> {
+        self.plan.as_ref().map(|p| p.motion.clone()).ok_or_else(|| Problem::new("there is no plan yet"))
+    }
+}
+
+pub fn diagnosis_view(d: &Diagnosis) -> DiagnosisView {
+    let number = |x: f64| significant(x, 4);
+    let interval = |low: f64, high: f64| format!("{} to {}", number(low), number(high));
+    let causes =
+        d.causes.iter().map(|c| {
+            let mut lines = vec![format!("confidence {}", significant(c.confidence, 3))];
+            lines.extend(c.parameters.iter().map(|(path, e)| {
+                format!("{path} = {} (95 %: {})", number(e.value), interval(e.low, e.high))
+            }));
+            if !c.equivalent.is_empty() {
+                lines.push(format!("equivalent: {}", c.equivalent.join(", ")));
+            }
+            CauseView { id: c.effect.clone(), title: title(&c.effect), lines }
+        });
+    let rows = d.base_parameters.iter().map(|p| {
+        let whose = if p.layer == 0 { "tissue".to_owned() } else { format!("layer {}", p.layer) };
+        let remark = match (p.at_bound, p.changed) {
+            (true, _) => "at its bound",
+            (_, true) => "changed",
+            _ => "",
+        };
+        vec![
+            whose,
+            p.name.clone(),
+            number(p.assumed),
+            number(p.value),
+            interval(p.low, p.high),
+            remark.to_owned(),
+        ]
+    });
+    let g = &d.gain;
+    let what = if g.held_out { "on held-out recordings" } else { "on the one recording, which was fitted" };
+    let notes = d.data_quality.iter().map(|q| format!("{}: {}", q.recording, q.note.message));
+    DiagnosisView {
+        sentence: summary_sentence(d),
+        verdict: format!("{:?}", d.verdict).to_lowercase(),
+        files: g.recordings.clone(),
+        causes: causes.collect(),
+        gain: format!(
+            "Residual {what}: {} N before, {} N after; noise {} N.",
+            significant(g.rmse_before_n, 3),
+            significant(g.rmse_after_n, 3),
+            significant(g.floor_n, 3)
+        ),
+        parameters: TableView {
+            head: ["", "parameter", "assumed", "fitted", "95 %", ""].map(str::to_owned).to_vec(),
+            rows: rows.collect(),
+        },
+        notes: recording_differences(d).into_iter().chain(d.advice.iter().cloned()).chain(notes).collect(),
+        not_identifiable: d.not_identifiable.iter().map(|id| title(id)).collect(),
+        folder: DIAGNOSIS.to_owned(),
+    }
+}
+
+/// The limits of the workspace, or those at first.
+pub fn limits(workspace: &Workspace, phantom: &Scenario) -> LimitsView {
+    let kept = workspace.read(LIMITS).and_then(|text| stylet_scenario::parse(LIMITS, &text).ok());
+    let depth_m = rounded(phantom.tissue.end_m());
+    let l: Limits = kept.unwrap_or(Limits { depth_m, ..LIMITS_AT_FIRST });
+    LimitsView {
+        depth_mm: millimetres(l.depth_m),
+        speed_mm_per_s: millimetres(l.speed_mps),
+        acceleration_mm_per_s2: millimetres(l.acceleration_mps2),
+        duration_s: l.duration_s,
+        force_n: l.force_n,
+    }
+}
