@@ -173,7 +173,7 @@ mod tests {
             "{millimetres}"
         );
         assert!(messages(&insertion(1.0, 1.0, -1e3)?).contains("mN (scale 0.001"));
-        assert!(messages(&insertion(1e3, 1.0, 1.0)?).contains("may be in ms (scale 0.001"));
+        assert!(messages(&insertion(1e3, 1.0, 1.0)?).contains("looks like milliseconds"));
         Ok(())
     }
 
