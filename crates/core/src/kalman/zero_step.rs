@@ -22,7 +22,7 @@ const JUMP_SAMPLES: f64 = 3.0;
 /// Log odds of a rupture against a step of the zero before any data: twenty to one.
 const RUPTURE_PRIOR_NATS: f64 = 3.0;
 /// Log odds at which a step of the zero is accepted, and at which a rupture is.
-const ACCEPTED_NATS: f64 = 2.5;
+const ACCEPTED_NATS: f64 = 3.0;
 const DISMISSED_NATS: f64 = 5.0;
 /// Standard deviation of the size of a drop, as a share of it: the elastic force at a rupture is not known better.
 const DROP_SD_SHARE: f64 = 0.1;
