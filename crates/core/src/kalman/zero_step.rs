@@ -22,7 +22,7 @@ const JUMP_SAMPLES: f64 = 3.0;
 /// Log odds of a rupture against a step of the zero before any data: twenty to one.
 const RUPTURE_PRIOR_NATS: f64 = 3.0;
 /// Log odds at which a step of the zero is accepted, and at which a rupture is.
-const ACCEPTED_NATS: f64 = 3.0;
+const ACCEPTED_NATS: f64 = 5.0;
 const DISMISSED_NATS: f64 = 5.0;
 /// Standard deviation of the size of a drop, as a share of it: the elastic force at a rupture is not known better.
 const DROP_SD_SHARE: f64 = 0.1;
@@ -113,9 +113,11 @@ impl KalmanEnhancer {
     /// The lowest force in N that a rupture may leave.
     pub(super) fn lowest_after_rupture_n(&self, position_m: f64) -> f64 {
         let bias = self.noise.bias_n();
-        // A drop may go on, and friction is known only where the base law holds.
-        let known =
-            self.estimator.passed_count > 0 && self.post_rupture.is_none() && self.misfit < MAX_ALARM_MISFIT;
+        // A drop may go on, and friction is known only where the base law holds and the last rupture stands.
+        let known = self.estimator.passed_count > 0
+            && self.post_rupture.is_none()
+            && self.rival.is_none()
+            && self.misfit < MAX_ALARM_MISFIT;
         if !known {
             return bias;
         }
