@@ -113,7 +113,9 @@ pub fn enhance_long_recording(
             run.trace.contact_s = recording.first_time_beyond_s(contact_m)?;
         }
     }
-    let extent = RecordingExtent { samples, duration_s: recording.duration_s()?, sample_hz };
+    let duration_s = recording.duration_s()?;
+    let mean_hz = samples.saturating_sub(1) as f64 / duration_s;
+    let extent = RecordingExtent { samples, duration_s, sample_hz: mean_hz };
     let table = EnhancedTable::Staged(file.finish()?);
     let model = model.map(|model| AppliedModel::new(model, &runs));
     Ok(EnhancementResult {

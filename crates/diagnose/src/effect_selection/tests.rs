@@ -422,7 +422,7 @@ fn candidates_far_behind_get_no_full_fit() {
         search.stages[0].candidates.iter().map(|r| r.0).collect::<Vec<_>>()
     };
     let punctures = "rate_dependent_puncture";
-    assert_eq!(names(&[], 0, 0.02), ["force_drift", "force_bias", punctures]);
+    assert_eq!(names(&[], 0, 0.02), ["force_drift", "force_bias", "position_dependent_force", punctures]);
     // Within thirty nats of the best no candidate is dropped.
     assert_eq!(
         names(&[], 0, 3e-4),

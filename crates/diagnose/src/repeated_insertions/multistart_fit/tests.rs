@@ -151,8 +151,11 @@ fn the_scatter_is_estimated_by_expectation_maximisation() {
         }
         let mut result = at.model.clone();
         update_scatter(&mut result, &data, &at);
-        near(result.scatter.surface_m, (surface / 3.0).sqrt());
-        near(result.scatter.ln_friction, (friction / 3.0).sqrt());
+        // At one speed surface and friction are almost collinear, and the factorisation's ridge shows.
+        let within =
+            |result: f64, wanted: f64| assert!((result / wanted - 1.0).abs() < 1e-3, "{result} for {wanted}");
+        within(result.scatter.surface_m, (surface / 3.0).sqrt());
+        within(result.scatter.ln_friction, (friction / 3.0).sqrt());
         assert_eq!(result.per_recording, at.model.per_recording);
     }
 }
