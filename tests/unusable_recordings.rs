@@ -335,7 +335,7 @@ fn recordings_that_a_search_would_misread_are_refused_before_it() {
         assert!(flat(&output).contains(remedy), "{name}: {}", flat(&output));
         assert!(!Path::new(&out).exists(), "{name}");
     }
-    let (a, b) = (scratch.file("a.csv", &csv(rows.clone())), scratch.file("b.csv", &csv(rows)));
+    let (a, b) = (scratch.file("a.csv", csv(rows.clone())), scratch.file("b.csv", csv(rows)));
     let (a, b) = (text(&a), text(&b));
     for flags in [&["--data", &a, &a][..], &["--data", &a, &b], &["--repeats", "--data", &a, &b, &a]] {
         let mut all = vec!["diagnose", &assumed];
@@ -350,7 +350,7 @@ fn recordings_that_a_search_would_misread_are_refused_before_it() {
 fn a_diagnosis_is_stopped_at_its_time_limit_and_writes_nothing() {
     let scratch = Scratch::new("time-limit");
     let assumed = text(&scratch.file("assumed.ron", ASSUMED));
-    let file = text(&scratch.file("a.csv", &csv(simulated(&scratch, 1))));
+    let file = text(&scratch.file("a.csv", csv(simulated(&scratch, 1))));
     let out = text(&scratch.path().join("out"));
     // The forecast for these samples is below the limit, which no diagnosis meets.
     let long = "0.0000001h";
