@@ -23,7 +23,10 @@ fn kinds(d: &Diagnosis) -> Vec<FindingKind> {
 }
 
 /// Every change that contradicts the model, and the kind of its finding.
-fn contradictions() -> Vec<(FindingKind, fn(&mut Diagnosis))> {
+/// A finding and a change of the diagnosis that gives it.
+type Contradiction = (FindingKind, fn(&mut Diagnosis));
+
+fn contradictions() -> Vec<Contradiction> {
     vec![
         (FindingKind::PredictionError, |d| d.gain.rmse_given_scatter_n = 0.041),
         (FindingKind::ResidualStructure, |d| d.residual_structure.p_value = 9e-4),

@@ -88,7 +88,8 @@ fn a_step_of_the_zero_in_tissue_is_reported_and_no_contact() {
     for size_n in [0.3, -0.9, 2.0] {
         let found = finding(-0.01, 0.015, Contact::Detected, move |t, _| if t < 9.0 { 0.0 } else { size_n });
         assert_eq!(found.hypothesis, ContactHypothesis::ConstantOffset, "{found:?}");
-        let [step] = found.zero_steps[..] else { panic!("{size_n}: {:?}", found.zero_steps) };
+        assert_eq!(found.zero_steps.len(), 1, "{size_n}: {:?}", found.zero_steps);
+        let step = found.zero_steps[0];
         assert!(step.in_tissue && (step.size_n - size_n).abs() < 0.1, "{step:?}");
         assert!((step.time_s - 9.0).abs() < 0.02, "{step:?}");
         assert!(found.contact_m.is_some_and(|z| z.abs() < 5e-4), "{found:?}");
