@@ -183,11 +183,13 @@ fn refit_without(best: &Fit, data: &FitData, r: usize) -> Option<Model> {
     let mut model = best.model.clone();
     model.rupture_times_s.remove(r);
     model.per_recording.remove(r);
-    let zero_steps = model.zero_steps.remove(r);
+    let zero_steps = (r < model.zero_steps.len()).then(|| model.zero_steps.remove(r));
     let fitted = fit(&model, &data.subset(&others), Effort { max_iterations: 2, min_gain_nats: 0.5 })?;
     let mut model = fitted.model;
     model.rupture_times_s.insert(r, vec![NO_RUPTURE; best.model.layers()]);
-    model.zero_steps.insert(r, zero_steps);
+    if let Some(zero_steps) = zero_steps {
+        model.zero_steps.insert(r, zero_steps);
+    }
     model.per_recording.insert(r, RecordingParameters::default());
     Some(model)
 }

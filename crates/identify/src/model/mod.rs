@@ -97,7 +97,8 @@ impl Model {
         let mut model = self.clone();
         model.per_recording = which.iter().map(|r| self.per_recording[*r]).collect();
         model.rupture_times_s = which.iter().map(|r| self.rupture_times_s[*r].clone()).collect();
-        model.zero_steps = which.iter().map(|r| self.zero_steps[*r].clone()).collect();
+        model.zero_steps =
+            which.iter().map(|r| self.zero_steps.get(*r).cloned().unwrap_or_default()).collect();
         if !self.day_of.is_empty() {
             model.day_of = which.iter().map(|r| self.day_of[*r]).collect();
         }

@@ -34,7 +34,7 @@ impl Model {
             Role::RecordingEffect(k) => self.per_recording[r].varying[k],
             Role::DaySurface(d) => self.days[d].surface_m,
             Role::DayFriction(d) => self.days[d].ln_friction,
-            Role::ZeroStep(k) => self.zero_steps[r].get(k).map_or(0.0, |s| s.size_n),
+            Role::ZeroStep(k) => self.zero_steps.get(r).and_then(|s| s.get(k)).map_or(0.0, |s| s.size_n),
             Role::RuptureTime(l) => self.rupture_times_s[r][l],
         }
     }
@@ -82,7 +82,7 @@ impl Model {
             Role::DaySurface(d) => self.days[d].surface_m = x,
             Role::DayFriction(d) => self.days[d].ln_friction = x,
             Role::ZeroStep(k) => {
-                if let Some(step) = self.zero_steps[r].get_mut(k) {
+                if let Some(step) = self.zero_steps.get_mut(r).and_then(|s| s.get_mut(k)) {
                     step.size_n = x;
                 }
             }

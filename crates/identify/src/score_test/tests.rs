@@ -143,9 +143,9 @@ fn strengths_are_scaled_within_an_extended_search_range() {
         scale_strengths(effect_info(id).expect("in the library"), group, coefficients)
     };
     assert_close(of("force_bias", &[&[0.1]], &[7.0])[0], 0.7);
-    // Searched from -2 to 2 N: the range once below, three times above.
-    assert_eq!(of("force_bias", &[&[0.1]], &[1e3]), [14.0]);
-    assert_eq!(of("force_bias", &[&[0.1]], &[-1e3]), [-6.0]);
+    // Searched up to its limits, from -100 to 100 N.
+    assert_eq!(of("force_bias", &[&[0.1]], &[1e4]), [100.0]);
+    assert_eq!(of("force_bias", &[&[0.1]], &[-1e4]), [-100.0]);
     // Within the library's limits.
     assert_eq!(of("rate_dependent_puncture", &[&[0.02]], &[1e3]), [2.0]);
     assert_eq!(of("coulomb_friction", &[&[1.0]], &[-3.0]), [0.0]);
