@@ -54,7 +54,7 @@ fn localised(b: &BlockAverages, drop: &ForceDrop, sign: f64) -> Option<ForceJump
 
 #[cfg(test)]
 mod tests {
-    use super::detect_force_jumps;
+    use super::{ForceJump, detect_force_jumps};
     use crate::block_averages::{BLOCK_S, BlockAverages};
     use stylet_record::Recording;
 
@@ -73,7 +73,8 @@ mod tests {
         let recording = Recording::with_velocity(t, x, vec![0.002; n], f).expect("a recording");
         let found = detect_force_jumps(&BlockAverages::new(&recording, &[], BLOCK_S));
         // The ramp is no jump; what is found within it is less than an eighth of it.
-        let (jumps, others): (Vec<_>, Vec<_>) = found.iter().partition(|jump| jump.score > 10.0);
+        let (jumps, others): (Vec<&ForceJump>, Vec<&ForceJump>) =
+            found.iter().partition(|jump| jump.score > 10.0);
         assert_eq!(jumps.len(), 2, "{found:?}");
         assert!(others.iter().all(|jump| jump.size_n.abs() < 0.06), "{found:?}");
         for (jump, (at, size)) in jumps.into_iter().zip([(6.0025, 0.3), (12.0025, -0.5)]) {

@@ -94,6 +94,7 @@ impl FileFormat {
 /// An open file of another program.
 pub(crate) enum Foreign<'a> {
     /// A spreadsheet as a text table in UTF-8, with one line per row.
+    #[cfg_attr(not(feature = "formats"), allow(dead_code, reason = "spreadsheets need the feature"))]
     Text(Vec<u8>),
     /// Named columns.
     Columns(ColumnsOfFile<'a>),
