@@ -426,7 +426,7 @@ fn candidates_far_behind_get_no_full_fit() {
     // Within thirty nats of the best no candidate is dropped.
     assert_eq!(
         names(&[], 0, 3e-4),
-        ["respiration", "cutting_force", "asymmetric_friction", "incomplete_release", punctures]
+        ["respiration", "cutting_force", "asymmetric_friction", "position_dependent_force", punctures]
     );
     // A candidate with a large penalty may gain more than others and still rank behind them.
     assert_eq!(
