@@ -46,10 +46,6 @@ pub(crate) struct Context {
 pub(crate) fn apply(d: &mut Diagnosis, context: &Context) {
     d.findings = findings(d, context);
     let contradicted = d.findings.iter().any(|f| contradicts(f.kind));
-    let mispredicted = d.findings.iter().any(|f| f.kind == FindingKind::PredictionError);
-    if d.verdict == Verdict::None && mispredicted {
-        d.verdict = Verdict::Unknown;
-    }
     d.agrees = d.verdict == Verdict::None && !contradicted;
     let most = max_confidence(&d.findings);
     for cause in &mut d.causes {
