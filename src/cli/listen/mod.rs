@@ -1,6 +1,7 @@
 //! `stylet listen`: the online core on a live stream of samples.
 
 mod outputs;
+mod poll_interval;
 mod reporter;
 mod udp_receiver;
 
@@ -8,6 +9,7 @@ use crate::cli::args::ListenArgs;
 use crate::cli::exit_codes::Failure;
 use crate::cli::terminal_output::print_error;
 use outputs::{Forwarder, Printer};
+use poll_interval::POLL_INTERVAL;
 use reporter::Reporter;
 use std::io::Read;
 use std::net::TcpListener;
@@ -19,8 +21,6 @@ use stylet_api::live_stream::{Broadcast, LineSplitter, PageServer, Session, Stre
 use stylet_scenario::EnhancerConfigFile;
 use udp_receiver::{Received, UdpReceiver};
 
-/// Longest time without a look at the clock and at signals.
-const POLL_INTERVAL: Duration = Duration::from_millis(100);
 /// Longest time after a signal for printing the last lines.
 const LAST_LINES_TIMEOUT: Duration = Duration::from_secs(2);
 /// Bytes of standard input that are read at once, and pieces that may wait.

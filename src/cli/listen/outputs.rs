@@ -1,6 +1,6 @@
 //! Threads that pass the lines on: to standard output, and as datagrams.
 
-use super::POLL_INTERVAL;
+use super::poll_interval::POLL_INTERVAL;
 use crate::cli::exit_codes::Failure;
 use crate::cli::terminal_output::print_error;
 use std::io::{ErrorKind, Write};

@@ -1,6 +1,6 @@
 //! Reception of datagrams, with the number of those that the system has dropped.
 
-use super::POLL_INTERVAL;
+use super::poll_interval::POLL_INTERVAL;
 use crate::cli::exit_codes::Failure;
 use std::io::{self, ErrorKind};
 use std::net::{SocketAddr, UdpSocket};

@@ -1,32 +1,25 @@
 //! The baseline that is followed in air, what is subtracted from the force, and the decisions on contact and steps of the zero.
 
-use super::air_history::{AirEvidence, AirHistory, BaselineFit, Form};
-use super::force_predictor::MotionStep;
+use super::air_history::{AirHistory, BaselineFit};
 use super::gaussian::at_least;
-use super::state::{FAILED_MISFIT, KalmanEnhancer};
-use crate::config::{Contact, EnhanceConfig};
-use crate::sample::{Baseline, Sample, ZeroStep};
+use crate::sample::Sample;
 
-/// Log odds at which a hypothesis about the air is acted upon: 7 to 1.
-const DECISION_NATS: f64 = 2.0;
-/// Log odds at which a contact is certain: 20 000 to 1.
-const SETTLED_NATS: f64 = 10.0;
 /// Samples between two evaluations, as a share of those so far.
 const EVALUATION_SHARE: f64 = 0.25;
 /// Samples before the first evaluation.
-const MIN_SAMPLES: f64 = 40.0;
+pub(super) const MIN_SAMPLES: f64 = 40.0;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AirBaseline {
     pub(super) history: AirHistory,
     /// Subtracted from the force: `n + drift (t - t0) + line (z - z0)`.
-    subtracted_n: f64,
-    rate: [f64; 2],
-    origin: [f64; 2],
+    pub(super) subtracted_n: f64,
+    pub(super) rate: [f64; 2],
+    pub(super) origin: [f64; 2],
     /// Last fit of a baseline that moves; the force in it is as measured.
     pub(super) fit: BaselineFit,
     pub(super) moving: bool,
-    next_evaluation: f64,
+    pub(super) next_evaluation: f64,
     /// The contact is certain, or given.
     pub(super) settled: bool,
     /// Force of the present sample as measured.
@@ -59,7 +52,7 @@ impl AirBaseline {
     }
 
     /// Subtracts drift and line of a fit from here on, without a jump.
-    fn follow(&mut self, fit: &BaselineFit, moving: bool, sample: &Sample) {
+    pub(super) fn follow(&mut self, fit: &BaselineFit, moving: bool, sample: &Sample) {
         self.subtracted_n = self.subtracted_n(sample.time_s, sample.position_m);
         self.origin = [sample.time_s, sample.position_m];
         self.rate = if moving { [fit.x[1], fit.x[2]] } else { [0.0; 2] };
@@ -72,179 +65,9 @@ impl AirBaseline {
         self.zero_steps += 1;
     }
 
-    fn schedule(&mut self) {
+    pub(super) fn schedule(&mut self) {
         let samples = self.history.samples;
         self.next_evaluation = samples + at_least(8.0, EVALUATION_SHARE * samples);
-    }
-}
-
-impl KalmanEnhancer {
-    /// Looks at the air, after every quarter more of it and whenever the force leaves the baseline (`away`: above it 1,
-    /// below it -1). True when a contact has begun: the evidence says where.
-    pub(super) fn look_at_air(&mut self, sample: &Sample, away: i8) -> Option<AirEvidence> {
-        let due = self.baseline.history.samples >= self.baseline.next_evaluation;
-        if !due && away == 0 || self.baseline.history.samples < MIN_SAMPLES {
-            return None;
-        }
-        if due {
-            self.baseline.schedule();
-        }
-        self.operations += self.baseline.history.evaluation_operations();
-        let evidence = self.baseline.history.evaluate();
-        if evidence.step_nats() > DECISION_NATS {
-            self.absorb_step_in_air(sample, &evidence);
-        } else if evidence.contact_nats() > DECISION_NATS {
-            // A baseline that moves may already follow the load, so that the force does not leave it.
-            let seen = away > 0 || self.baseline.moving || evidence.contact_nats() > SETTLED_NATS;
-            return seen.then_some(evidence);
-        } else if evidence.quiet.nats > evidence.bend.nats.max(evidence.step.nats) {
-            let moves = evidence.quiet.form != Form::Constant
-                && evidence.quiet.nats - evidence.constant_nats > DECISION_NATS;
-            if moves || self.baseline.moving {
-                self.follow_baseline(sample, &evidence);
-            }
-        }
-        None
-    }
-
-    /// Fits the baseline to all samples in air.
-    #[cold]
-    fn follow_baseline(&mut self, sample: &Sample, evidence: &AirEvidence) {
-        let fit = self.baseline.history.quiet_fit(evidence, sample);
-        self.baseline.follow(&fit, evidence.quiet.form != Form::Constant, sample);
-        self.restart_noise(sample, &fit, evidence.excess);
-        (self.samples_above_threshold, self.samples_below_threshold) = (0, 0);
-    }
-
-    /// Noise and offset of the force less what is subtracted.
-    fn restart_noise(&mut self, sample: &Sample, fit: &BaselineFit, excess: f64) {
-        let history = &self.baseline.history;
-        let (variance, rho) = (history.noise_variance(), history.rho());
-        let level_n = fit.x[0] - self.baseline.subtracted_n(sample.time_s, sample.position_m);
-        let long_run = variance * excess * (1.0 + rho) / (1.0 - rho);
-        let count = (long_run / at_least(1e-300, fit.p[0][0])).clamp(1.0, fit.samples.max(1.0));
-        self.noise.restart_in_air(level_n, variance, rho, count, sample.force_n);
-    }
-
-    #[cold]
-    fn absorb_step_in_air(&mut self, sample: &Sample, evidence: &AirEvidence) {
-        let step = evidence.step;
-        let baseline = &mut self.baseline;
-        let (time_s, position_m) = baseline.history.onset(step.from);
-        let fit = baseline.history.fit_behind_step(evidence, sample);
-        baseline.history.absorb_step(step.from, step.size);
-        baseline.zero_steps += 1;
-        self.output.zero_step = Some(ZeroStep {
-            time_s,
-            position_m,
-            size_n: step.size,
-            sd_n: libm::sqrt(evidence.event_variance(&step)),
-            in_tissue: false,
-            withdrawn: None,
-        });
-        self.low_passed_n = sample.force_n;
-        self.baseline.follow(&fit, step.form != Form::Constant, sample);
-        self.restart_noise(sample, &fit, evidence.excess);
-        (self.samples_above_threshold, self.samples_below_threshold) = (0, 0);
-    }
-
-    /// Contact where the evidence has it, with the baseline from the air before.
-    #[cold]
-    pub(super) fn start_contact_at_bend(
-        &mut self,
-        config: &EnhanceConfig,
-        step: &MotionStep,
-        sample: &Sample,
-        evidence: &AirEvidence,
-        (mut rise, mut sd): (f64, f64),
-    ) {
-        let bend = evidence.bend;
-        let (_, onset_m) = self.baseline.history.onset(bend.from);
-        let moving = bend.form != Form::Constant;
-        let fit = self.baseline.history.fit_before_bend(evidence, sample);
-        if moving || self.baseline.moving {
-            self.baseline.follow(&fit, moving, sample);
-            self.restart_noise(sample, &fit, evidence.excess);
-            rise = at_least(0.0, self.low_passed_n - self.noise.bias_n());
-            sd = libm::sqrt(sd * sd + fit.p[0][0]);
-        }
-        self.start_contact(config, step, sample, sample.position_m, rise, rise + 3.0 * sd);
-        if moving {
-            self.set_estimator_baseline(&fit);
-        }
-        // The line of the load crosses that of the baseline.
-        let variance = 4.0 * evidence.event_variance(&bend) + fit.p[0][0];
-        self.output.contact_m = Some(onset_m);
-        self.output.contact_probability = evidence.contact_probability();
-        self.output.contact_sd_m = libm::sqrt(variance) / at_least(1e-300, bend.size);
-        self.baseline.schedule();
-    }
-
-    /// Drift and line of a fit become unknowns of the layer estimator.
-    pub(super) fn set_estimator_baseline(&mut self, fit: &BaselineFit) {
-        self.estimator.set_baseline(fit, &self.noise);
-        self.snapshot = self.estimator;
-        self.free_tip.restart_from(&self.estimator);
-    }
-
-    /// While a contact is not certain: takes the sample as one in air too, and cancels the contact when a moving baseline or a
-    /// step of the zero explains more.
-    #[cold]
-    pub(super) fn verify_evidence(&mut self, config: &EnhanceConfig, sample: &Sample) {
-        if config.contact != Contact::Detected || self.estimator.passed_count > 0 {
-            self.baseline.settled = true;
-            return;
-        }
-        self.baseline.history.push(&Sample { force_n: self.baseline.measured_n, ..*sample });
-        if self.baseline.history.samples < self.baseline.next_evaluation {
-            return;
-        }
-        self.baseline.schedule();
-        self.operations += self.baseline.history.evaluation_operations();
-        let evidence = self.baseline.history.evaluate();
-        self.output.contact_probability = evidence.contact_probability();
-        if evidence.contact_nats() > SETTLED_NATS {
-            self.baseline.settled = true;
-        } else if evidence.contact_nats() < -DECISION_NATS {
-            self.in_tissue = false;
-            self.output.contact_m = None;
-            (self.output.contact_sd_m, self.output.contact_probability) = (0.0, 0.0);
-            (self.misfit, self.misfit_weight, self.base_law_failed) = (FAILED_MISFIT, 1.0, false);
-            self.peak_force_n = 0.0;
-            (self.candidate, self.deferred, self.spike_samples) = (None, false, 0);
-            if evidence.step_nats() > 0.0 {
-                self.absorb_step_in_air(sample, &evidence);
-            } else {
-                self.follow_baseline(sample, &evidence);
-            }
-            self.low_passed_n = self.noise.bias_n();
-        }
-    }
-
-    /// The baseline at a sample, for the output.
-    pub(super) fn baseline_now(&self, sample: &Sample) -> Baseline {
-        let baseline = &self.baseline;
-        let subtracted_n = baseline.subtracted_n(sample.time_s, sample.position_m);
-        let mut out = Baseline {
-            kind: if baseline.moving { baseline.fit.kind } else { Default::default() },
-            offset_n: self.noise.bias_n() + subtracted_n,
-            drift_n_per_s: baseline.rate[0],
-            line_n_per_m: baseline.rate[1],
-            sd: [libm::sqrt(self.noise.bias_variance()), 0.0, 0.0],
-            zero_steps: baseline.zero_steps,
-        };
-        if baseline.moving {
-            let (mean, sd) = if self.in_tissue {
-                self.estimator.baseline_residual(&self.noise)
-            } else {
-                let p = &baseline.fit.p;
-                ([0.0; 2], [libm::sqrt(at_least(0.0, p[1][1])), libm::sqrt(at_least(0.0, p[2][2]))])
-            };
-            out.drift_n_per_s += mean[0];
-            out.line_n_per_m += mean[1];
-            out.sd = [out.sd[0], sd[0], sd[1]];
-        }
-        out
     }
 }
 

@@ -1,6 +1,7 @@
 //! [`Algorithm::Stylet`](crate::config::Algorithm::Stylet): Kalman filters for the next force and for the layers, CUSUM
 //! rupture alarm, one pass, bounded work per sample. Derivation: `docs/enhancer.md`.
 
+mod air_decisions;
 mod air_history;
 mod air_sums;
 mod baseline;
@@ -20,6 +21,7 @@ mod state;
 mod tissue_update;
 mod velocity_estimator;
 mod zero_step;
+mod zero_step_state;
 
 #[cfg(test)]
 mod test_support;

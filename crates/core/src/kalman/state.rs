@@ -8,10 +8,13 @@ use super::layer_estimator::{LayerEstimator, PassedLayers};
 use super::noise_estimator::NoiseEstimator;
 use super::shaft_friction::DryShaftFriction;
 use super::velocity_estimator::VelocityEstimator;
-use super::zero_step::{Jump, Rival};
+use super::zero_step_state::{Jump, Rival};
 use crate::config::EnhanceConfig;
 use crate::sample::{Output, Sample};
 
+/// Misfit up to which the layer estimator feeds the alarm. If all the excess over one were a constant offset, of 0.45 standard
+/// deviations, the CUSUMs would not drift.
+pub(super) const MAX_ALARM_MISFIT: f64 = 1.2;
 /// Stiffest tissue, in N/m: prior width of an unknown slope.
 pub(super) const MAX_STIFFNESS_N_PER_M: f64 = 2000.0;
 /// Multiplications and additions of a rupture (linear maps of six and five unknowns).

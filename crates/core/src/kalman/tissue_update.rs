@@ -5,7 +5,8 @@ use super::gaussian::{at_least, at_most};
 use super::layer_estimator::{LayerEstimator, LayerInnovation};
 use super::noise_estimator::NoiseEstimator;
 use super::state::{
-    FAILED_MISFIT, KalmanEnhancer, MAX_DROP_DURATION_S, MAX_STIFFNESS_N_PER_M, OPERATIONS_PER_RUPTURE,
+    FAILED_MISFIT, KalmanEnhancer, MAX_ALARM_MISFIT, MAX_DROP_DURATION_S, MAX_STIFFNESS_N_PER_M,
+    OPERATIONS_PER_RUPTURE,
 };
 use crate::config::EnhanceConfig;
 use crate::sample::Sample;
@@ -18,9 +19,6 @@ const OPERATIONS_PER_PREDICTION: u32 = 5 * 14 + 2 * 24 + 2 * 20;
 /// Of the layer estimator: an innovation, and an update of six unknowns.
 const OPERATIONS_PER_LAYER_INNOVATION: u32 = 2 * 35;
 const OPERATIONS_PER_LAYER_UPDATE: u32 = 2 * 27 + 12;
-/// Misfit up to which the layer estimator feeds the alarm. If all the excess over one were a constant offset, of 0.45 standard
-/// deviations, the CUSUMs would not drift.
-pub(super) const MAX_ALARM_MISFIT: f64 = 1.2;
 /// Relative deviation from the usual speed up to which it does.
 const MAX_SPEED_DEVIATION: f64 = 0.05;
 /// Limits on squared standardised innovations, so that one sample does not dominate a mean.

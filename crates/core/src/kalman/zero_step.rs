@@ -6,9 +6,8 @@
 use super::air_history::MIN_JUMP_SHARE;
 use super::gaussian::{at_least, at_most};
 use super::layer_estimator::{BIAS, LayerEstimator};
-use super::shaft_friction::DryShaftFriction;
-use super::state::KalmanEnhancer;
-use super::tissue_update::MAX_ALARM_MISFIT;
+use super::state::{KalmanEnhancer, MAX_ALARM_MISFIT};
+use super::zero_step_state::{Jump, Rival};
 use crate::sample::{Sample, ZeroStep};
 
 /// Samples by which a jump has to last, and within which it has to be level.
@@ -28,37 +27,6 @@ const DISMISSED_NATS: f64 = 5.0;
 const DROP_SD_SHARE: f64 = 0.1;
 /// Travel in m after which a rupture stands.
 const MAX_RIVAL_TRAVEL_M: f64 = 12e-3;
-
-/// Deviations of consecutive samples from the prediction.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Jump {
-    sum_n: f64,
-    low_n: f64,
-    high_n: f64,
-    /// Variance of the prediction in N².
-    variance: f64,
-    count: u8,
-    /// Difference of the first of them to the sample before, in N.
-    first_n: f64,
-    start: Sample,
-}
-
-/// The last rupture as a step of the zero.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Rival {
-    /// The old layer with another zero.
-    estimator: LayerEstimator,
-    /// The new layer after a drop of uncertain size.
-    rupture: LayerEstimator,
-    bias_n: f64,
-    /// Log odds of the step in nats.
-    nats: f64,
-    at: Sample,
-    /// What the rupture has overwritten.
-    dry_friction: DryShaftFriction,
-    contact: (Option<f64>, f64),
-    counts: (u32, u32, f64),
-}
 
 impl KalmanEnhancer {
     /// Takes a sample far off the prediction by `e_n`. True when the zero has jumped.

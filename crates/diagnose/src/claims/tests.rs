@@ -22,10 +22,10 @@ fn kinds(d: &Diagnosis) -> Vec<FindingKind> {
     d.findings.iter().map(|f| f.kind).collect()
 }
 
-/// Every change that contradicts the model, and the kind of its finding.
 /// A finding and a change of the diagnosis that gives it.
 type Contradiction = (FindingKind, fn(&mut Diagnosis));
 
+/// Every change that contradicts the model, and the kind of its finding.
 fn contradictions() -> Vec<Contradiction> {
     vec![
         (FindingKind::PredictionError, |d| d.gain.rmse_given_scatter_n = 0.041),
