@@ -141,11 +141,13 @@ pub fn check_own_file(
     content: Option<&[u8]>,
     is_own: impl Fn(&[u8]) -> bool,
 ) -> Result<(), Error> {
-    let Ok(found) = fs::symlink_metadata(path) else { return Ok(()) };
+    if fs::symlink_metadata(path).is_err() {
+        return Ok(());
+    }
     let refused = |why| Err(Error::NotReplaced { path: path.display().to_string(), why });
     let is_input = inputs.iter().any(|input| is_same(path, input));
-    // Devices and pipes are written to, not replaced; writing to a folder fails with a message of its own.
-    if !is_input && !found.is_file() && !found.is_symlink() {
+    // Devices and pipes, behind links too, are written to, not replaced; writing to a folder fails with a message of its own.
+    if !is_input && fs::metadata(path).is_ok_and(|found| !found.is_file()) {
         return Ok(());
     }
     let bytes = fs::read(path).unwrap_or_default();
