@@ -67,10 +67,15 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
 fn refuse_grave(args: &EnhanceArgs, notes: &[QualityNote]) -> Result<(), Failure> {
     let grave =
         |kind| matches!(kind, QualityKind::Reversed | QualityKind::ReversedPosition | QualityKind::UnitMixUp);
-    match notes.iter().find(|note| note.blocking && grave(note.kind)) {
-        Some(note) => Err(Failure::Check(format!("{}: {}", args.data.display(), note.message))),
-        None => Ok(()),
+    let found: Vec<&str> = notes
+        .iter()
+        .filter(|note| note.blocking && grave(note.kind))
+        .map(|note| note.message.as_str())
+        .collect();
+    if found.is_empty() {
+        return Ok(());
     }
+    Err(Failure::Check(format!("{}: {}", args.data.display(), found.join("; "))))
 }
 
 fn command(args: &EnhanceArgs) -> String {

@@ -17,14 +17,15 @@ use stylet_examine::{CaseId, Hide, Severity, Size, World, Wrong, make_case};
 use stylet_record::Recording;
 use stylet_scenario::Scenario;
 use stylet_stats::wilson;
+use stylet_tissue::{Effect, ForceBias, ForceDrift, PositionDependentForce, ZeroStep};
 
 /// What is drawn, the name that a right answer has, and whether any name of an effect with a clock is wrong.
 const KINDS: [(&str, Option<&str>); 8] = [
     ("clean", None),
-    ("offset", Some("force_bias")),
-    ("drift", Some("force_drift")),
-    ("line", Some("position_dependent_force")),
-    ("steps", Some("zero_step")),
+    ("offset", Some(ForceBias::ID)),
+    ("drift", Some(ForceDrift::ID)),
+    ("line", Some(PositionDependentForce::ID)),
+    ("steps", Some(ZeroStep::ID)),
     ("loaded", None),
     ("cyclic", None),
     ("cyclic_hysteresis", None),

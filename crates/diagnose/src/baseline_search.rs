@@ -48,7 +48,7 @@ pub(crate) fn search_with_baseline(
         && leaves_noise(&fit, &data_of_baseline);
     let start = Search { base: base.clone(), stages, ..Search::from_fit(fit, data_of_baseline) };
     let mut from_baseline = Search::run_from(start, &with_steps, progress);
-    remove_weak_steps(&mut from_baseline);
+    remove_weak_steps(&mut from_baseline, NoiseSource::LongMemory);
     if dominant {
         return (from_baseline, with_steps);
     }
@@ -103,21 +103,13 @@ impl Baseline {
         // As long as more than noise is left, a drop may be a step instead of a rupture, or the reverse.
         let exchanged = |mut best: Fitted| {
             for _ in 0..MAX_EXCHANGES {
-                // Where every drop has a layer, there is none too many.
-                let spare: Vec<usize> = unassigned(&candidates.drops, &best.1)
-                    .filter(|drop| !best.0.zero_steps[drop.0].contains(&drop.1))
-                    .map(|drop| drop.0)
-                    .collect();
-                if spare.is_empty() || leaves_noise(&best.1, &best.2) {
+                if leaves_noise(&best.1, &best.2) {
                     break;
                 }
                 let others: Vec<(f64, Fitted)> = candidates
                     .drops
-                    .iter()
-                    .filter(|drop| spare.contains(&drop.0))
+                    .par_iter()
                     .take(MAX_ALTERNATIVES)
-                    .collect::<Vec<_>>()
-                    .into_par_iter()
                     .filter_map(|drop| fitted(toggled(&best.0.zero_steps, *drop)))
                     .map(|other| (gain_of(&other, &best), other))
                     .collect();
@@ -194,7 +186,7 @@ impl Search {
     /// remaining effect.
     fn prune_baseline(&mut self) -> Vec<SearchStage> {
         loop {
-            remove_weak_steps(self);
+            remove_weak_steps(self, NoiseSource::Residual);
             let blocks = self.data.compared_block_count();
             let tried: Vec<(usize, Fit)> = (0..self.best.model.effects.len())
                 .into_par_iter()

@@ -107,10 +107,10 @@ fn step_sds(f: &Fit, data: &FitData) -> Vec<Vec<f64>> {
     f.model.zero_steps.iter().enumerate().map(|(r, s)| (0..s.len()).map(|k| sd(r, k)).collect()).collect()
 }
 
-/// Removes the least significant step as long as it does not pay for its two parameters.
-pub(crate) fn remove_weak_steps(search: &mut Search) {
+/// Removes the least significant step as long as it does not pay for its two parameters, under the noise of this source.
+pub(crate) fn remove_weak_steps(search: &mut Search, noise: NoiseSource) {
     while search.best.model.zero_step_count() > 0 {
-        let data = search.data.with_estimated_noise(&search.best.residuals.residual_n, NoiseSource::Residual);
+        let data = search.data.with_estimated_noise(&search.best.residuals.residual_n, noise);
         let Some(at) = residuals(&search.best.model, &data) else { return };
         let f = Fit { model: search.best.model.clone(), residuals: at };
         let nats = |s: &ZeroStep, sd: f64| 0.5 * (s.size_n / sd).powi(2);
@@ -172,11 +172,26 @@ impl ZeroStepReport {
 
     /// Adds the causes; an offset before steps to the right zero is no cause of its own.
     pub(crate) fn add_to(&mut self, causes: &mut Vec<Cause>) {
+        // The offset of a recording is that of the first and its own difference.
+        let common = causes.iter().find(|c| c.effect == ForceBias::ID).cloned();
+        if let (Some(offset), Some(common)) = (&mut self.offset, &common) {
+            widen(offset, common);
+        }
         if self.offset.is_some() || self.holds_offset {
             causes.retain(|c| c.effect != ForceBias::ID);
         }
         causes.extend(self.offset.take().filter(|_| !self.holds_offset));
         causes.extend(self.steps.take());
+    }
+}
+
+/// Adds the half widths of `other`'s intervals to those of `cause` in quadrature.
+fn widen(cause: &mut Cause, other: &Cause) {
+    for (path, e) in &mut cause.parameters {
+        let half = |e: &Estimate| 0.5 * (e.high - e.low);
+        let Some(other) = other.parameters.get(path) else { continue };
+        let half = half(e).hypot(half(other));
+        (e.low, e.high) = (e.value - half, e.value + half);
     }
 }
 

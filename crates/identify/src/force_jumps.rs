@@ -2,6 +2,7 @@
 
 use crate::block_averages::BlockAverages;
 use crate::force_drops::{ForceDrop, detect_force_drops};
+use stylet_stats::order_statistics::median;
 
 /// Samples on each side whose means localise a jump.
 const LOCAL_SAMPLES: usize = 6;
@@ -9,6 +10,9 @@ const LOCAL_SAMPLES: usize = 6;
 const SEARCH_BLOCKS: usize = 2;
 /// Share of its size by which the force must change between the samples on both sides; a fast ramp changes by less.
 const MIN_LOCAL_SHARE: f64 = 0.6;
+/// Size of a jump in standard deviations of the same difference elsewhere in the recording: noise of any colour has no such
+/// jumps.
+const MIN_LOCAL_SD: f64 = 6.0;
 
 /// A jump between two samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,8 +29,9 @@ pub struct ForceJump {
 #[must_use]
 pub fn detect_force_jumps(b: &BlockAverages) -> Vec<ForceJump> {
     let negated = b.with_force(b.force_n.iter().map(|f| -f).collect());
+    let min_n = MIN_LOCAL_SD * difference_sd_n(&b.sample_force_n);
     let of = |drops: Vec<ForceDrop>, sign: f64| {
-        drops.into_iter().filter_map(move |d| localised(b, &d, sign)).collect::<Vec<ForceJump>>()
+        drops.into_iter().filter_map(move |d| localised(b, &d, sign, min_n)).collect::<Vec<ForceJump>>()
     };
     let mut all = of(detect_force_drops(b), -1.0);
     all.extend(of(detect_force_drops(&negated), 1.0));
@@ -34,18 +39,32 @@ pub fn detect_force_jumps(b: &BlockAverages) -> Vec<ForceJump> {
     all
 }
 
-/// The jump between the two samples where it is; `None` where the force does not jump.
-fn localised(b: &BlockAverages, drop: &ForceDrop, sign: f64) -> Option<ForceJump> {
+/// Difference in N between the means of the samples from `i` on and before `i`.
+fn difference(force: &[f64], i: usize) -> f64 {
+    stylet_stats::mean(&force[i..i + LOCAL_SAMPLES]) - stylet_stats::mean(&force[i - LOCAL_SAMPLES..i])
+}
+
+/// Robust standard deviation in N of these differences: the median absolute deviation of normal numbers is 0.6745 of it.
+fn difference_sd_n(force: &[f64]) -> f64 {
+    let mut all: Vec<f64> = (LOCAL_SAMPLES..(force.len() + 1).saturating_sub(LOCAL_SAMPLES))
+        .map(|i| difference(force, i))
+        .collect();
+    let middle = median(&mut all);
+    all.iter_mut().for_each(|d| *d = (*d - middle).abs());
+    median(&mut all) / 0.6745
+}
+
+/// The jump between the two samples where it is; `None` where the force does not jump by at least `min_n` N.
+fn localised(b: &BlockAverages, drop: &ForceDrop, sign: f64, min_n: f64) -> Option<ForceJump> {
     let (time, force) = (&b.sample_time_s, &b.sample_force_n);
     let reach_s = (SEARCH_BLOCKS as f64 + 0.5) * b.samples_per_block as f64 * b.sample_step_s;
     let from = time.partition_point(|t| *t < drop.time_s - reach_s).max(LOCAL_SAMPLES);
     let to =
         time.partition_point(|t| *t <= drop.time_s + reach_s).min(time.len().checked_sub(LOCAL_SAMPLES)?);
-    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len().max(1) as f64;
-    let jump = |i: usize| sign * (mean(&force[i..i + LOCAL_SAMPLES]) - mean(&force[i - LOCAL_SAMPLES..i]));
+    let jump = |i: usize| sign * difference(force, i);
     let at = (from..to).max_by(|a, b| jump(*a).total_cmp(&jump(*b)))?;
     let size = jump(at);
-    (size >= MIN_LOCAL_SHARE * drop.size_n).then(|| ForceJump {
+    (size >= min_n.max(MIN_LOCAL_SHARE * drop.size_n)).then(|| ForceJump {
         time_s: 0.5 * (time[at - 1] + time[at]),
         size_n: sign * drop.size_n,
         score: drop.score,
