@@ -141,8 +141,7 @@ fn beats_are_not_identified_as_a_tone() {
 /// Sensor drift must neither imitate a boundary shift nor hide a tone in the coloured noise.
 #[test]
 fn sensor_drift_is_no_boundary_shift_and_hides_no_tone() {
-    let mut cases =
-        vec![case(Wrong::Wander, Hide::Clean, 141, 0), case(Wrong::Wander, Hide::Clean, 141, 5)];
+    let mut cases = vec![case(Wrong::Wander, Hide::Clean, 141, 0), case(Wrong::Wander, Hide::Clean, 141, 5)];
     for wrong in [Wrong::Wander, Wrong::Recordings] {
         cases.extend(cases_of("periodic_interference", wrong, 128, 1));
     }
