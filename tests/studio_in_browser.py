@@ -205,9 +205,12 @@ def walk(page, studio, files, workspace, options):
         page.wait_for_timeout(200)
     # A unit is corrected by clicking.
     drop(page, files["mm"])
-    page.get_by_label("quantity of depth").select_option("position")
-    page.get_by_label("unit of depth").select_option("mm")
     page.get_by_text("at 200 Hz").first.wait_for()
+    page.keyboard.press("1")
+    page.get_by_label("unit of depth").select_option("cm")
+    page.wait_for_timeout(500)
+    page.get_by_label("unit of depth").select_option("mm")
+    page.wait_for_timeout(500)
     check((workspace / "columns.ron").read_text().count("0.001") == 1, "the corrected unit is in columns.ron")
     page.get_by_role("button", name="Forget the map").click()
     page.get_by_role("button", name=re.compile("^Remove in_mm")).click()
@@ -215,7 +218,7 @@ def walk(page, studio, files, workspace, options):
         path = files["a"].parent / name
         path.write_text(text, encoding="utf-8")
         drop(page, path)
-        page.get_by_text(re.compile(f"^{re.escape(name)}$")).first.wait_for()
+        page.wait_for_function("n => document.getElementById('view-look').dataset.drawn?.startsWith(n)", arg=name)
         page.keyboard.press("1")
         page.get_by_text("samples over 37.99 s").first.wait_for()
         page.get_by_role("button", name=f"Remove {name}").click()

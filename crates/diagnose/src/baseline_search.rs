@@ -44,15 +44,19 @@ pub(crate) fn search_with_baseline(
         return (Search::run(prepared, base, data, progress), prepared.clone());
     };
     let Baseline { prepared: with_steps, fit, data: data_of_baseline, stages } = baseline;
-    let dominant = base.rms_n(&data) > DOMINANT_FACTOR * fit.rms_n(&data_of_baseline)
-        && leaves_noise(&fit, &data_of_baseline);
-    let start = Search { base: base.clone(), stages, ..Search::from_fit(fit, data_of_baseline) };
+    let explains = leaves_noise(&fit, &data_of_baseline);
+    let dominant = explains && base.rms_n(&data) > DOMINANT_FACTOR * fit.rms_n(&data_of_baseline);
+    let from_base = (!dominant).then(|| Search::run(prepared, base.clone(), data, progress));
+    // Where the baseline alone is not enough and other effects are, it is none.
+    if let Some(s) = from_base.as_ref().filter(|s| !explains && leaves_noise(&s.best, &s.data)) {
+        return (s.clone(), prepared.clone());
+    }
+    let start = Search { base, stages, ..Search::from_fit(fit, data_of_baseline) };
     let mut from_baseline = Search::run_from(start, &with_steps, progress);
     remove_weak_steps(&mut from_baseline, NoiseSource::LongMemory);
-    if dominant {
+    let Some(from_base) = from_base else {
         return (from_baseline, with_steps);
-    }
-    let from_base = Search::run(prepared, base, data, progress);
+    };
     let penalty =
         |s: &Search| bic_penalty(s.best.model.effect_parameter_count(), s.data.compared_block_count());
     let needed = penalty(&from_baseline) - penalty(&from_base);

@@ -2,7 +2,8 @@
 //!
 //! The online core ([`stylet_core`]) follows the baseline and finds the contact. A recording as a whole shows more: if what the core
 //! took for air is explained neither by an offset, a drift and a line in position nor by the steps of the zero that were found in it,
-//! the needle was loaded from the first sample on.
+//! the needle was loaded from the first sample on. A step at a change of speed is friction, and a line steeper than the layer behind
+//! the contact is a layer.
 
 use serde::Serialize;
 use stylet_core::config::Contact;
@@ -16,6 +17,8 @@ const MIN_BLOCKS: usize = 12;
 const MAX_VARIANCE_RATIO: f64 = 9.0;
 /// Residuals below this share of the range of the force are wander of the sensor.
 const MIN_RANGE_SHARE: f64 = 0.02;
+/// Change of speed, as a share of the larger one, at which a jump of the force is friction.
+const MIN_SPEED_CHANGE_SHARE: f64 = 0.5;
 /// Travel below this share of its noise, or of nothing, is no motion, in m.
 const MIN_TRAVEL_M: f64 = 1e-9;
 /// Median absolute deviation to standard deviation, for second differences of white block averages: `1.4826/sqrt(6)`.
@@ -101,8 +104,8 @@ impl ContactFinding {
             }
             ContactHypothesis::BeginsLoaded if self.setting == "auto" => {
                 return format!(
-                    "the recording begins loaded: no offset, drift, line in position or step of the zero explains the force before the \
-                     contact that was found ({setting}); use --contact none, or --contact known with the surface's position"
+                    "the recording begins loaded: no offset, drift, line in position or step of the zero explains its beginning; enhanced as \
+                     with --contact none, where forces are absolute ({setting}); use --contact known to give the surface's position"
                 );
             }
             ContactHypothesis::BeginsLoaded => {
@@ -128,6 +131,18 @@ impl ContactFinding {
             _ => "no contact yet".to_owned(),
         };
         format!("{place}, after {before} ({setting})")
+    }
+
+    /// The contact was to be detected, and the recording begins loaded.
+    #[must_use]
+    pub fn is_loaded_unexpectedly(&self) -> bool {
+        self.hypothesis == ContactHypothesis::BeginsLoaded && self.setting == Contact::Detected.name()
+    }
+
+    /// The finding without a contact and without the baseline and the steps in air that led to one.
+    #[must_use]
+    pub fn without_contact(&self) -> Self {
+        Self { setting: self.setting, hypothesis: self.hypothesis, ..Self::default() }
     }
 
     /// The finding is remarkable: anything but a constant offset.
@@ -158,6 +173,8 @@ pub struct ContactAssessor {
     air_baseline: Baseline,
     baseline: Baseline,
     span_m: Option<[f64; 2]>,
+    /// Stiffness in N/m of the layer behind the contact.
+    first_stiffness_n_per_m: Option<f64>,
 }
 
 impl ContactAssessor {
@@ -171,6 +188,9 @@ impl ContactAssessor {
         self.baseline = out.baseline;
         if !out.used {
             return;
+        }
+        if out.contact_m.is_some() && out.ruptures == 0 {
+            self.first_stiffness_n_per_m = Some(out.theta[0]);
         }
         let z = sample.position_m;
         let [low, high] = self.span_m.unwrap_or([z; 2]);
@@ -243,11 +263,11 @@ impl ContactAssessor {
 
     /// Neither offset, drift, line nor the steps found explain the force before the contact, or all of it without one.
     fn is_unexplained(&self, contact_m: Option<f64>) -> bool {
-        let steps: Vec<f64> = self.zero_steps.iter().filter(|s| !s.in_tissue).map(|s| s.time_s).collect();
         let half_s = match self.blocks.as_slice() {
             [first, second, ..] => second.time_s - first.time_s,
             _ => return false,
         };
+        let steps: Vec<f64> = self.zero_steps.iter().filter(|s| !s.in_tissue).map(|s| s.time_s).collect();
         let until = contact_m
             .and_then(|z| self.blocks.iter().position(|b| b.position_m >= z))
             .unwrap_or(self.blocks.len());
@@ -255,22 +275,27 @@ impl ContactAssessor {
             .iter()
             .filter(|b| steps.iter().all(|t| (b.time_s - t).abs() > half_s))
             .collect();
+        let steps: Vec<f64> = steps.into_iter().filter(|t| !self.speed_changes_at(*t)).collect();
         if air.len() < MIN_BLOCKS + steps.len() {
             return false;
         }
-        // Regression on one, time, position and the steps.
-        let columns = 3 + steps.len();
+        let step = |b: &Block, t: &f64| f64::from(u8::from(b.time_s > *t));
         let (t0, z0) = (air[0].time_s, air[0].position_m);
-        let design = nalgebra::DMatrix::from_fn(air.len(), columns, |i, j| match j {
-            0 => 1.0,
-            1 => air[i].time_s - t0,
-            2 => 1e3 * (air[i].position_m - z0),
-            _ => f64::from(u8::from(air[i].time_s > steps[j - 3])),
-        });
-        let force = nalgebra::DVector::from_fn(air.len(), |i, _| air[i].force_n);
-        let Ok(fit) = design.clone().svd(true, true).solve(&force, 1e-9) else { return false };
-        let residual = force - design * fit;
-        let variance = residual.norm_squared() / (air.len() - columns) as f64;
+        let regression = |baseline: &dyn Fn(&Block) -> Vec<f64>| {
+            let rows: Vec<Vec<f64>> = air
+                .iter()
+                .map(|b| baseline(b).into_iter().chain(steps.iter().map(|t| step(b, t))).collect())
+                .collect();
+            let columns = rows[0].len();
+            let design = nalgebra::DMatrix::from_fn(air.len(), columns, |i, j| rows[i][j]);
+            let force = nalgebra::DVector::from_fn(air.len(), |i, _| air[i].force_n);
+            let fit = design.clone().svd(true, true).solve(&force, 1e-9).ok()?;
+            let variance = (force - design * &fit).norm_squared() / (air.len() - columns) as f64;
+            Some((fit, variance))
+        };
+        let Some((_, variance)) = regression(&|b| vec![1.0, b.time_s - t0, 1e3 * (b.position_m - z0)]) else {
+            return false;
+        };
         let mut bends: Vec<f64> =
             air.windows(3).map(|w| (w[0].force_n - 2.0 * w[1].force_n + w[2].force_n).abs()).collect();
         bends.sort_by(f64::total_cmp);
@@ -278,7 +303,25 @@ impl ContactAssessor {
         let forces = self.blocks.iter().map(|b| b.force_n);
         let range_n = forces.clone().fold(f64::NEG_INFINITY, f64::max) - forces.fold(f64::INFINITY, f64::min);
         let least_n = MIN_RANGE_SHARE * range_n;
-        variance > MAX_VARIANCE_RATIO * noise_n * noise_n && variance > least_n * least_n
+        if variance > MAX_VARIANCE_RATIO * noise_n * noise_n && variance > least_n * least_n {
+            return true;
+        }
+        let line = regression(&|b| vec![1.0, 1e3 * (b.position_m - z0)]);
+        let steepest = self.first_stiffness_n_per_m.filter(|_| contact_m.is_some());
+        line.zip(steepest).is_some_and(|((fit, _), stiffness)| 1e3 * fit[1] > stiffness)
+    }
+
+    /// Whether the speed changes at a time (s): between the two blocks before and the two after.
+    fn speed_changes_at(&self, time_s: f64) -> bool {
+        let at = self.blocks.partition_point(|b| b.time_s < time_s);
+        let speed = |from: usize| {
+            let [a, b] = [self.blocks.get(from)?, self.blocks.get(from + 1)?];
+            Some((b.position_m - a.position_m) / (b.time_s - a.time_s))
+        };
+        let (Some(before), Some(after)) = (at.checked_sub(3).and_then(speed), speed(at + 1)) else {
+            return false;
+        };
+        (after - before).abs() > MIN_SPEED_CHANGE_SHARE * before.abs().max(after.abs())
     }
 }
 

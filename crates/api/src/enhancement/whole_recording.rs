@@ -3,7 +3,8 @@
 use super::identified_model::IdentifiedModel;
 use crate::error::Error;
 use crate::run_report::AlgorithmRun;
-use stylet_core::config::Model;
+use stylet_core::EnhanceConfig;
+use stylet_core::config::{Contact, Model};
 use stylet_record::Recording;
 use stylet_scenario::EnhancerConfigFile;
 use stylet_score::{Trace, algorithm_name, model_name};
@@ -42,18 +43,24 @@ pub(super) fn run_enhancer(
     regressor: Model,
     model: Option<&IdentifiedModel>,
 ) -> AlgorithmRun {
-    let run = empty_run(config, regressor);
+    let mut run = empty_run(config, regressor);
     let (force_n, surface_m) = (&recording.force_n, config.surface_m);
-    let trace = match model {
+    let trace = |enhance: &EnhanceConfig| match model {
         Some(model) => {
             let mut shaft = model.shaft_friction(recording.sample_hz());
-            Trace::run_with_model(recording, force_n, &run.config, surface_m, |s, ruptures| {
+            Trace::run_with_model(recording, force_n, enhance, surface_m, |s, ruptures| {
                 shaft.step(s.time_s, s.position_m, s.velocity_mps, ruptures)
             })
         }
-        None => Trace::run(recording, force_n, &run.config, surface_m, |_, _| {}),
+        None => Trace::run(recording, force_n, enhance, surface_m, |_, _| {}),
     };
-    AlgorithmRun { trace, ..run }
+    run.trace = trace(&run.config);
+    if run.trace.contact.is_loaded_unexpectedly() {
+        let contact = run.trace.contact.without_contact();
+        run.config.contact = Contact::None;
+        run.trace = Trace { contact, ..trace(&run.config) };
+    }
+    run
 }
 
 /// A run without outputs yet.

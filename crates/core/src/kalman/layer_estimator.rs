@@ -261,6 +261,16 @@ impl LayerEstimator {
         self.belief.x[K] + self.belief.x[B] * drive
     }
 
+    /// Nats against a stiffness and a friction coefficient below zero, about `-log P(K > 0, b > 0)`.
+    pub(super) fn negative_nats(&self, noise: &NoiseEstimator) -> f64 {
+        [K, B].map(|i| {
+            let (x, p) = (self.belief.x[i].min(0.0), self.belief.p[i][i] * noise.variance);
+            0.5 * x * x / at_least(1e-300, p)
+        })
+        .iter()
+        .sum()
+    }
+
     /// Slope and its standard deviation.
     pub(super) fn slope_and_sd(&self, drive: f64, noise: &NoiseEstimator) -> (f64, f64) {
         let g = &self.belief;

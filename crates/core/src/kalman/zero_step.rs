@@ -148,11 +148,13 @@ impl KalmanEnhancer {
     #[inline]
     pub(super) fn decide_rival(&mut self, sample: &Sample) -> bool {
         let Some(rival) = &self.rival else { return false };
-        if rival.nats > ACCEPTED_NATS {
+        // A layer that pushes the needle is none.
+        let nats = rival.nats + rival.rupture.negative_nats(&self.noise) - rival.estimator.negative_nats(&self.noise);
+        if nats > ACCEPTED_NATS {
             self.withdraw_rupture();
             return true;
         }
-        if rival.nats < -DISMISSED_NATS || sample.position_m - rival.at.position_m > MAX_RIVAL_TRAVEL_M {
+        if nats < -DISMISSED_NATS || sample.position_m - rival.at.position_m > MAX_RIVAL_TRAVEL_M {
             self.rival = None;
         }
         false
@@ -191,4 +193,4 @@ impl KalmanEnhancer {
 }
 
 /// Multiplications and additions of a sample of the rival.
-const RIVAL_OPERATIONS: u32 = 2 * (2 * 56 + 2 * 44) + 20;
+const RIVAL_OPERATIONS: u32 = 2 * (2 * 56 + 2 * 44) + 40;
