@@ -350,7 +350,7 @@ def views(page, options):
 def many_diagnoses(page, studio):
     page.keyboard.press("4")
     for _ in range(20):
-        page.get_by_role("button", name="Diagnose").click()
+        page.get_by_role("button", name="Diagnose", exact=True).click()
         page.locator("#view-explain progress").wait_for()
         page.locator("#view-explain progress").wait_for(state="hidden", timeout=120_000)
     check(studio.memory_mb() <= 200, f"the server uses {studio.memory_mb():.0f} MB after 20 diagnoses")
