@@ -128,6 +128,7 @@ fn summary(args: &EnhanceArgs, result: &EnhancementResult) -> String {
             (Some(z), Some(t)) => {
                 let _ = writeln!(out, "  first contact at {:.2} mm, {t:.3} s", z * 1e3);
             }
+            _ if r.trace.contact.is_loaded_unexpectedly() => {}
             _ => {
                 let blocking = notes.iter().any(|n| n.blocking);
                 let why = if blocking { "see the note" } else { "the force never exceeds its noise in air" };

@@ -17,7 +17,7 @@ use stylet_examine::{CaseId, Hide, Severity, Size, World, Wrong, make_case};
 use stylet_record::Recording;
 use stylet_scenario::Scenario;
 use stylet_stats::wilson;
-use stylet_tissue::{Effect, ForceBias, ForceDrift, PositionDependentForce, ZeroStep};
+use stylet_tissue::{ForceBias, ForceDrift, PositionDependentForce, ZeroStep};
 
 /// What is drawn, the name that a right answer has, and whether any name of an effect with a clock is wrong.
 const KINDS: [(&str, Option<&str>); 8] = [

@@ -47,10 +47,11 @@ pub(crate) fn search_with_baseline(
     let explains = leaves_noise(&fit, &data_of_baseline);
     let dominant = explains && base.rms_n(&data) > DOMINANT_FACTOR * fit.rms_n(&data_of_baseline);
     let from_base = (!dominant).then(|| Search::run(prepared, base.clone(), data, progress));
-    // Where the baseline alone is not enough and other effects are, it is none.
-    if let Some(s) = from_base.as_ref().filter(|s| !explains && leaves_noise(&s.best, &s.data)) {
-        return (s.clone(), prepared.clone());
-    }
+    let from_base = match from_base {
+        // Where the baseline alone is not enough and other effects are, it is none.
+        Some(s) if !explains && leaves_noise(&s.best, &s.data) => return (s, prepared.clone()),
+        other => other,
+    };
     let start = Search { base, stages, ..Search::from_fit(fit, data_of_baseline) };
     let mut from_baseline = Search::run_from(start, &with_steps, progress);
     remove_weak_steps(&mut from_baseline, NoiseSource::LongMemory);

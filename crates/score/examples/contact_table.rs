@@ -17,7 +17,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 use stylet_core::config::Contact;
-use stylet_core::{EnhanceConfig, Enhancer, LayerEstimate, Output, Sample};
+use stylet_core::{EnhanceConfig, Enhancer, LayerEstimate, Output, Sample, Units};
 use stylet_score::{ContactAssessor, ContactFinding};
 use stylet_tissue::{ForceLaw, ForceLawState, Layer, Tissue};
 
@@ -154,8 +154,9 @@ struct Row {
 
 /// Outputs of the core, and how the recording is found to begin.
 fn enhanced(case: &Case, contact: Contact) -> (Vec<Output>, ContactFinding) {
-    let mut core = Enhancer::new(EnhanceConfig { contact, ..EnhanceConfig::default() }, 0.0, []);
-    let mut assessor = ContactAssessor::default();
+    let config = EnhanceConfig { contact, ..EnhanceConfig::default() };
+    let mut assessor = ContactAssessor::new(&config, 0.0, Units::default());
+    let mut core = Enhancer::new(config, 0.0, []);
     let step = |s: &Sample| {
         let out = core.step(*s);
         assessor.push(s, &out);
@@ -167,8 +168,7 @@ fn enhanced(case: &Case, contact: Contact) -> (Vec<Output>, ContactFinding) {
 
 fn judge(row: &mut Row, case: &Case, outs: &[Output], loaded: bool, list: bool) {
     let contact = outs.last().and_then(|o| o.contact_m);
-    let near =
-        if case.loaded { loaded } else { !loaded && contact.is_some_and(|z| z.abs() < NEAR_M) };
+    let near = if case.loaded { loaded } else { !loaded && contact.is_some_and(|z| z.abs() < NEAR_M) };
     row.cases += 1;
     row.near += usize::from(near);
     let mut found: Vec<(usize, f64)> = Vec::new();

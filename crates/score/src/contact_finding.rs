@@ -1,29 +1,17 @@
 //! How a recording begins: which baseline the force follows before contact, where contact is, and whether there is any air at all.
 //!
-//! The online core ([`stylet_core`]) follows the baseline and finds the contact. A recording as a whole shows more: if what the core
-//! took for air is explained neither by an offset, a drift and a line in position nor by the steps of the zero that were found in it,
-//! the needle was loaded from the first sample on. A step at a change of speed is friction, and a line steeper than the layer behind
-//! the contact is a layer.
+//! The online core ([`stylet_core`]) follows the baseline and finds the contact. Whether there was any air is decided over the whole
+//! recording: a second core starts in the tissue, and the start that predicts the next samples better holds.
 
 use serde::Serialize;
-use stylet_core::config::Contact;
-use stylet_core::{Baseline, BaselineKind, Output, Sample, ZeroStep};
+use stylet_core::config::{Algorithm, Contact};
+use stylet_core::{Baseline, BaselineKind, EnhanceConfig, Enhancer, Output, Sample, Units, ZeroStep};
 
-/// Most block averages kept of a recording; when they are full, neighbours are merged.
-const MAX_BLOCKS: usize = 512;
-/// Fewest blocks in air from which a misfit of the baseline is judged.
-const MIN_BLOCKS: usize = 12;
-/// Variance of the residuals over that of the noise above which no baseline explains the air: three standard deviations.
-const MAX_VARIANCE_RATIO: f64 = 9.0;
-/// Residuals below this share of the range of the force are wander of the sensor.
-const MIN_RANGE_SHARE: f64 = 0.02;
-/// Change of speed, as a share of the larger one, at which a jump of the force is friction.
-const MIN_SPEED_CHANGE_SHARE: f64 = 0.5;
+/// Log odds in nats at which the recording begins in the tissue, from the errors of prediction of both starts: these are correlated,
+/// and a start in air is usual.
+const MIN_LOADED_NATS: f64 = 30.0;
 /// Travel below this share of its noise, or of nothing, is no motion, in m.
 const MIN_TRAVEL_M: f64 = 1e-9;
-/// Median absolute deviation to standard deviation, for second differences of white block averages: `1.4826/sqrt(6)`.
-const SECOND_DIFFERENCE_SD: f64 = 0.6053;
-
 /// Hypothesis about the beginning of a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -104,7 +92,7 @@ impl ContactFinding {
             }
             ContactHypothesis::BeginsLoaded if self.setting == "auto" => {
                 return format!(
-                    "the recording begins loaded: no offset, drift, line in position or step of the zero explains its beginning; enhanced as \
+                    "the recording begins loaded: a start in the tissue predicts the force better than any in air; enhanced as \
                      with --contact none, where forces are absolute ({setting}); use --contact known to give the surface's position"
                 );
             }
@@ -152,32 +140,33 @@ impl ContactFinding {
     }
 }
 
-/// Means of consecutive samples.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Block {
-    time_s: f64,
-    position_m: f64,
-    force_n: f64,
-}
-
-/// Collects what a finding needs, sample by sample, in bounded memory.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Collects what a finding needs, sample by sample.
+#[derive(Clone, Debug, Default)]
 pub struct ContactAssessor {
-    blocks: Vec<Block>,
-    unit: usize,
-    open: Block,
-    count: usize,
+    /// The core that starts in the tissue, without stored samples.
+    loaded: Option<Enhancer<Vec<Sample>>>,
+    /// Mean squared errors of prediction in N² of the start in air and in the tissue, over so many samples.
+    mean_squares_n2: [f64; 2],
+    count: f64,
     zero_steps: Vec<ZeroStep>,
     last: Option<(Option<f64>, f64, f64)>,
     /// Baseline when the contact was declared.
     air_baseline: Baseline,
-    baseline: Baseline,
     span_m: Option<[f64; 2]>,
-    /// Stiffness in N/m of the layer behind the contact.
-    first_stiffness_n_per_m: Option<f64>,
 }
 
 impl ContactAssessor {
+    /// For a core with this configuration and surface.
+    #[must_use]
+    pub fn new(config: &EnhanceConfig, surface_m: f64, units: Units) -> Self {
+        let detected = config.contact == Contact::Detected && config.active_algorithm() == Algorithm::Stylet;
+        let start = || {
+            let config = EnhanceConfig { contact: Contact::None, ..config.clone() };
+            Enhancer::with_units(config, surface_m, units, Vec::new())
+        };
+        Self { loaded: detected.then(start), ..Self::default() }
+    }
+
     /// Takes a sample and its output.
     pub fn push(&mut self, sample: &Sample, out: &Output) {
         self.zero_steps.extend(out.zero_step);
@@ -185,41 +174,23 @@ impl ContactAssessor {
             self.air_baseline = out.baseline;
         }
         self.last = Some((out.contact_m, out.contact_sd_m, out.contact_probability));
-        self.baseline = out.baseline;
+        let loaded = self.loaded.as_mut().map(|core| core.step(*sample));
         if !out.used {
             return;
-        }
-        if out.contact_m.is_some() && out.ruptures == 0 {
-            self.first_stiffness_n_per_m = Some(out.theta[0]);
         }
         let z = sample.position_m;
         let [low, high] = self.span_m.unwrap_or([z; 2]);
         self.span_m = Some([low.min(z), high.max(z)]);
-        self.unit = self.unit.max(1);
-        self.count += 1;
-        let share = 1.0 / self.count as f64;
-        let mix = |mean: f64, x: f64| mean + share * (x - mean);
-        self.open = Block {
-            time_s: mix(self.open.time_s, sample.time_s),
-            position_m: mix(self.open.position_m, z),
-            force_n: mix(self.open.force_n, sample.force_n),
-        };
-        if self.count < self.unit {
-            return;
-        }
-        self.blocks.push(std::mem::take(&mut self.open));
-        self.count = 0;
-        if self.blocks.len() == MAX_BLOCKS {
-            self.blocks = self
-                .blocks
-                .chunks_exact(2)
-                .map(|pair| Block {
-                    time_s: 0.5 * (pair[0].time_s + pair[1].time_s),
-                    position_m: 0.5 * (pair[0].position_m + pair[1].position_m),
-                    force_n: 0.5 * (pair[0].force_n + pair[1].force_n),
-                })
-                .collect();
-            self.unit *= 2;
+        if let Some(loaded) =
+            loaded.filter(|o| o.used && out.contact_m.is_some() && sample.velocity_mps > 0.0)
+        {
+            let errors_n = [out.error_n, loaded.error_n];
+            if errors_n.iter().all(|e| e.is_finite()) {
+                self.count += 1.0;
+                for (mean, e) in self.mean_squares_n2.iter_mut().zip(errors_n) {
+                    *mean += (e * e - *mean) / self.count;
+                }
+            }
         }
     }
 
@@ -242,7 +213,7 @@ impl ContactAssessor {
         finding.hypothesis = match setting {
             Contact::None => ContactHypothesis::BeginsLoaded,
             _ if high - low < MIN_TRAVEL_M => ContactHypothesis::AtRest,
-            Contact::Detected if self.is_unexplained(contact_m) => ContactHypothesis::BeginsLoaded,
+            Contact::Detected if self.loaded_nats() > MIN_LOADED_NATS => ContactHypothesis::BeginsLoaded,
             Contact::Detected if contact_m.is_none() => ContactHypothesis::NeverTouches,
             _ => finding.hypothesis,
         };
@@ -261,67 +232,10 @@ impl ContactAssessor {
         }
     }
 
-    /// Neither offset, drift, line nor the steps found explain the force before the contact, or all of it without one.
-    fn is_unexplained(&self, contact_m: Option<f64>) -> bool {
-        let half_s = match self.blocks.as_slice() {
-            [first, second, ..] => second.time_s - first.time_s,
-            _ => return false,
-        };
-        let steps: Vec<f64> = self.zero_steps.iter().filter(|s| !s.in_tissue).map(|s| s.time_s).collect();
-        let until = contact_m
-            .and_then(|z| self.blocks.iter().position(|b| b.position_m >= z))
-            .unwrap_or(self.blocks.len());
-        let air: Vec<&Block> = self.blocks[..until]
-            .iter()
-            .filter(|b| steps.iter().all(|t| (b.time_s - t).abs() > half_s))
-            .collect();
-        let steps: Vec<f64> = steps.into_iter().filter(|t| !self.speed_changes_at(*t)).collect();
-        if air.len() < MIN_BLOCKS + steps.len() {
-            return false;
-        }
-        let step = |b: &Block, t: &f64| f64::from(u8::from(b.time_s > *t));
-        let (t0, z0) = (air[0].time_s, air[0].position_m);
-        let regression = |baseline: &dyn Fn(&Block) -> Vec<f64>| {
-            let rows: Vec<Vec<f64>> = air
-                .iter()
-                .map(|b| baseline(b).into_iter().chain(steps.iter().map(|t| step(b, t))).collect())
-                .collect();
-            let columns = rows[0].len();
-            let design = nalgebra::DMatrix::from_fn(air.len(), columns, |i, j| rows[i][j]);
-            let force = nalgebra::DVector::from_fn(air.len(), |i, _| air[i].force_n);
-            let fit = design.clone().svd(true, true).solve(&force, 1e-9).ok()?;
-            let variance = (force - design * &fit).norm_squared() / (air.len() - columns) as f64;
-            Some((fit, variance))
-        };
-        let Some((_, variance)) = regression(&|b| vec![1.0, b.time_s - t0, 1e3 * (b.position_m - z0)]) else {
-            return false;
-        };
-        let mut bends: Vec<f64> =
-            air.windows(3).map(|w| (w[0].force_n - 2.0 * w[1].force_n + w[2].force_n).abs()).collect();
-        bends.sort_by(f64::total_cmp);
-        let noise_n = SECOND_DIFFERENCE_SD * bends.get(bends.len() / 2).copied().unwrap_or(0.0);
-        let forces = self.blocks.iter().map(|b| b.force_n);
-        let range_n = forces.clone().fold(f64::NEG_INFINITY, f64::max) - forces.fold(f64::INFINITY, f64::min);
-        let least_n = MIN_RANGE_SHARE * range_n;
-        if variance > MAX_VARIANCE_RATIO * noise_n * noise_n && variance > least_n * least_n {
-            return true;
-        }
-        let line = regression(&|b| vec![1.0, 1e3 * (b.position_m - z0)]);
-        let steepest = self.first_stiffness_n_per_m.filter(|_| contact_m.is_some());
-        line.zip(steepest).is_some_and(|((fit, _), stiffness)| 1e3 * fit[1] > stiffness)
-    }
-
-    /// Whether the speed changes at a time (s): between the two blocks before and the two after.
-    fn speed_changes_at(&self, time_s: f64) -> bool {
-        let at = self.blocks.partition_point(|b| b.time_s < time_s);
-        let speed = |from: usize| {
-            let [a, b] = [self.blocks.get(from)?, self.blocks.get(from + 1)?];
-            Some((b.position_m - a.position_m) / (b.time_s - a.time_s))
-        };
-        let (Some(before), Some(after)) = (at.checked_sub(3).and_then(speed), speed(at + 1)) else {
-            return false;
-        };
-        (after - before).abs() > MIN_SPEED_CHANGE_SHARE * before.abs().max(after.abs())
+    /// Log odds in nats of a start in the tissue.
+    fn loaded_nats(&self) -> f64 {
+        let [in_air, loaded] = self.mean_squares_n2;
+        if loaded > 0.0 { 0.5 * self.count * (in_air / loaded).ln() } else { 0.0 }
     }
 }
 

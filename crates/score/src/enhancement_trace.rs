@@ -6,7 +6,7 @@ use crate::offline_least_squares::{LayerSample, OfflineEstimate, fit_layer_offli
 use crate::score::Score;
 use crate::scorer::{Scorer, TrueSample};
 use stylet_core::config::{Algorithm, EnhanceConfig, Model};
-use stylet_core::{Baseline, Detection, Enhancer, LayerEstimate, Sample, State, UnusedReason, ZeroStep};
+use stylet_core::{Baseline, Detection, LayerEstimate, Sample, State, Units, UnusedReason, ZeroStep};
 use stylet_record::LayerTruth;
 use stylet_record::{Recording, Truth};
 
@@ -71,32 +71,36 @@ impl Trace {
         surface_m: f64,
         each: impl FnMut(usize, &stylet_core::Output),
     ) -> Self {
-        let core = core_for(recording, force_n, config, surface_m);
-        let core = EnhancerWithModel::new(core, None::<fn(&Sample, usize) -> f64>);
-        Self::collect(recording, force_n, core, each)
+        let model = None::<fn(&Sample, usize) -> f64>;
+        Self::collect(recording, force_n, (config, surface_m), ContactAssessor::default(), model, each)
     }
 
-    /// As [`Trace::run`] with the shaft friction of an identified model, see [`EnhancerWithModel`].
+    /// As [`Trace::run`] for a measured recording, which may begin in the tissue: the finding tells. Optionally with the shaft
+    /// friction of an identified model, see [`EnhancerWithModel`].
     #[must_use]
-    pub fn run_with_model(
+    pub fn run_measured(
         recording: &Recording,
         force_n: &[f64],
         config: &EnhanceConfig,
         surface_m: f64,
-        model: impl FnMut(&Sample, usize) -> f64,
+        model: Option<impl FnMut(&Sample, usize) -> f64>,
     ) -> Self {
-        let core = core_for(recording, force_n, config, surface_m);
-        Self::collect(recording, force_n, EnhancerWithModel::new(core, Some(model)), |_, _| {})
+        let assessor = ContactAssessor::new(config, surface_m, units_of(recording, force_n));
+        Self::collect(recording, force_n, (config, surface_m), assessor, model, |_, _| {})
     }
 
     fn collect<M: FnMut(&Sample, usize) -> f64>(
         recording: &Recording,
         force_n: &[f64],
-        mut core: EnhancerWithModel<M>,
+        (config, surface_m): (&EnhanceConfig, f64),
+        mut assessor: ContactAssessor,
+        model: Option<M>,
         mut each: impl FnMut(usize, &stylet_core::Output),
     ) -> Self {
         let mut trace = Trace::default();
-        let (mut assessor, setting) = (ContactAssessor::default(), core.contact_setting());
+        let units = units_of(recording, force_n);
+        let mut core =
+            EnhancerWithModel::new(enhancer_in_units(recording.len(), config, surface_m, units), model);
         for (index, (s, &force_n)) in recording.samples().zip(force_n).enumerate() {
             let sample =
                 Sample { time_s: s.time_s, position_m: s.position_m, velocity_mps: s.velocity_mps, force_n };
@@ -106,7 +110,7 @@ impl Trace {
             trace.push(&out);
             trace.record_events(&out);
         }
-        trace.contact = assessor.finish(setting);
+        trace.contact = assessor.finish(config.contact);
         trace.contact_s =
             trace.contact_m.and_then(|z| recording.samples().find(|s| s.position_m >= z)).map(|s| s.time_s);
         trace
@@ -189,18 +193,13 @@ impl Trace {
     }
 }
 
-/// The core in units that fit the recording.
-fn core_for(
-    recording: &Recording,
-    force_n: &[f64],
-    config: &EnhanceConfig,
-    surface_m: f64,
-) -> Enhancer<Vec<Sample>> {
+/// Units that fit the recording.
+fn units_of(recording: &Recording, force_n: &[f64]) -> Units {
     let mut scale = RecordingScale::default();
     for (z, f) in recording.position_m.iter().zip(force_n) {
         scale.push(*z, *f);
     }
-    enhancer_in_units(recording.len(), config, surface_m, scale.units())
+    scale.units()
 }
 
 /// Stiffness in N/m and friction in the model's unit; NaN before contact.

@@ -88,12 +88,6 @@ impl<M: FnMut(&Sample, usize) -> f64> EnhancerWithModel<M> {
         Self { core, model }
     }
 
-    /// Source of the first contact.
-    #[must_use]
-    pub fn contact_setting(&self) -> stylet_core::config::Contact {
-        self.core.config().contact
-    }
-
     /// Processes one sample. With a model, enhanced force and band are those of [`Enhancer::apply_model_friction`]. The values of
     /// a sample that the core has ignored are not current, and NaN.
     pub fn step(&mut self, sample: Sample) -> Output {

@@ -56,7 +56,7 @@ pub fn enhance_long_recording(
         }
     }
     let Pass { mut runs, table, columns, plot } = pass;
-    let (samples, sample_hz) = (recording.len(), recording.sample_hz()?);
+    let samples = recording.len();
     let HashingWriter { file, mut hash } = table.finish().map_err(failed)?;
     let columns = columns.finish().map_err(failed)?;
     let (mut piece, mut bytes) = (Vec::new(), Vec::new());
@@ -131,12 +131,13 @@ impl Pass {
         let hashing = HashingWriter { file: lock.stage_file("enhanced.csv")?, hash: ResultHash::default() };
         let mut table = RowWriter::new(&header(recording.column_names()), hashing).map_err(failed)?;
         // The hash takes one column after the other.
-        let mut columns = DiskTableWriter::new(lock.folder(), runs.len() * result_hash::HASHED_COLUMNS)
-            .map_err(failed)?;
+        let mut columns =
+            DiskTableWriter::new(lock.folder(), runs.len() * result_hash::HASHED_COLUMNS).map_err(failed)?;
         let mut plot = PlotSampler::new(samples, runs.len());
         let mut outs = vec![Output::default(); runs.len()];
         let (mut index, mut hashed_row) = (0, Vec::new());
-        let mut assessors = vec![ContactAssessor::default(); runs.len()];
+        let mut assessors: Vec<ContactAssessor> =
+            runs.iter().map(|r| ContactAssessor::new(&r.config, surface_m, scale.units())).collect();
         recording.for_each_sample(|s, row| -> Result<(), Error> {
             let sample = Sample {
                 time_s: s.time_s,
@@ -161,8 +162,8 @@ impl Pass {
             index += 1;
             Ok(())
         })?;
-        for ((run, assessor), enhancer) in runs.iter_mut().zip(&assessors).zip(&enhancers) {
-            run.trace.contact = assessor.finish(enhancer.contact_setting());
+        for (run, assessor) in runs.iter_mut().zip(&assessors) {
+            run.trace.contact = assessor.finish(run.config.contact);
         }
         Ok(Self { runs, table, columns, plot })
     }

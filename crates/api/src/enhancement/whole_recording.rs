@@ -3,8 +3,8 @@
 use super::identified_model::IdentifiedModel;
 use crate::error::Error;
 use crate::run_report::AlgorithmRun;
-use stylet_core::EnhanceConfig;
 use stylet_core::config::{Contact, Model};
+use stylet_core::{EnhanceConfig, Sample};
 use stylet_record::Recording;
 use stylet_scenario::EnhancerConfigFile;
 use stylet_score::{Trace, algorithm_name, model_name};
@@ -44,15 +44,12 @@ pub(super) fn run_enhancer(
     model: Option<&IdentifiedModel>,
 ) -> AlgorithmRun {
     let mut run = empty_run(config, regressor);
-    let (force_n, surface_m) = (&recording.force_n, config.surface_m);
-    let trace = |enhance: &EnhanceConfig| match model {
-        Some(model) => {
-            let mut shaft = model.shaft_friction(recording.sample_hz());
-            Trace::run_with_model(recording, force_n, enhance, surface_m, |s, ruptures| {
-                shaft.step(s.time_s, s.position_m, s.velocity_mps, ruptures)
-            })
-        }
-        None => Trace::run(recording, force_n, enhance, surface_m, |_, _| {}),
+    let trace = |enhance: &EnhanceConfig| {
+        let shaft = model.map(|model| model.shaft_friction(recording.sample_hz()));
+        let friction = shaft.map(|mut shaft| {
+            move |s: &Sample, ruptures| shaft.step(s.time_s, s.position_m, s.velocity_mps, ruptures)
+        });
+        Trace::run_measured(recording, &recording.force_n, enhance, config.surface_m, friction)
     };
     run.trace = trace(&run.config);
     if run.trace.contact.is_loaded_unexpectedly() {

@@ -17,7 +17,7 @@
 
 use super::air_history::BaselineFit;
 use super::force_predictor::MEMORY_M;
-use super::gaussian::{Gaussian, Innovation, MAX_VARIANCE_RATIO, at_least};
+use super::gaussian::{Gaussian, Innovation, MAX_VARIANCE_RATIO, at_least, at_most};
 use super::noise_estimator::NoiseEstimator;
 use crate::sample::MAX_LAYERS;
 
@@ -261,14 +261,16 @@ impl LayerEstimator {
         self.belief.x[K] + self.belief.x[B] * drive
     }
 
-    /// Nats against a stiffness and a friction coefficient below zero, about `-log P(K > 0, b > 0)`.
+    /// Nats against a stiffness and a friction coefficient below zero, of this layer and the one before: about minus the logarithm of
+    /// the probability that they are positive.
     pub(super) fn negative_nats(&self, noise: &NoiseEstimator) -> f64 {
-        [K, B].map(|i| {
-            let (x, p) = (self.belief.x[i].min(0.0), self.belief.p[i][i] * noise.variance);
-            0.5 * x * x / at_least(1e-300, p)
-        })
-        .iter()
-        .sum()
+        let g = &self.belief;
+        let one = |i: usize| {
+            let x = at_most(0.0, g.x[i]);
+            0.5 * x * x / at_least(1e-300, g.p[i][i] * noise.variance)
+        };
+        let before = if self.passed_count > 0 { one(K_PREV) + one(B_PREV) } else { 0.0 };
+        one(K) + one(B) + before
     }
 
     /// Slope and its standard deviation.

@@ -127,6 +127,7 @@ impl KalmanEnhancer {
         if self.next_report_at < u32::MAX {
             self.report_previous_layer(sample);
         }
+        self.decide_rival_at_rupture(sample, self.snapshot_m);
         let bias = self.noise.bias_n();
         self.rival = self.rival_of_rupture(sample);
         let span = (sample.position_m - self.snapshot_m).max(0.0);

@@ -6,7 +6,7 @@
 use super::air_history::MIN_JUMP_SHARE;
 use super::gaussian::{at_least, at_most};
 use super::layer_estimator::{BIAS, LayerEstimator};
-use super::state::{KalmanEnhancer, MAX_ALARM_MISFIT};
+use super::state::{KalmanEnhancer, MAX_ALARM_MISFIT, OPERATIONS_PER_RUPTURE};
 use super::zero_step_state::{Jump, Rival};
 use crate::sample::{Sample, ZeroStep};
 
@@ -149,7 +149,8 @@ impl KalmanEnhancer {
     pub(super) fn decide_rival(&mut self, sample: &Sample) -> bool {
         let Some(rival) = &self.rival else { return false };
         // A layer that pushes the needle is none.
-        let nats = rival.nats + rival.rupture.negative_nats(&self.noise) - rival.estimator.negative_nats(&self.noise);
+        let nats = rival.nats + rival.rupture.negative_nats(&self.noise)
+            - rival.estimator.negative_nats(&self.noise);
         if nats > ACCEPTED_NATS {
             self.withdraw_rupture();
             return true;
@@ -158,6 +159,24 @@ impl KalmanEnhancer {
             self.rival = None;
         }
         false
+    }
+
+    /// Another rupture before the last one is decided. Its drop tells how much of the force was elastic, hence what friction
+    /// either explanation leaves; the last one is withdrawn where it would have to be negative.
+    pub(super) fn decide_rival_at_rupture(&mut self, sample: &Sample, rupture_m: f64) {
+        let Some(rival) = self.rival else { return };
+        let negative_nats = |mut estimator: LayerEstimator| {
+            let mut passed_layers = self.passed_layers;
+            let drive = at_least(1e-6, self.steady_drive_mps);
+            estimator.rupture(rupture_m, 0.0, drive, &self.noise, &mut passed_layers);
+            estimator.update(sample.position_m, self.friction_drive_mps, sample.force_n, 0.0);
+            estimator.negative_nats(&self.noise)
+        };
+        let nats = rival.nats + negative_nats(rival.rupture) - negative_nats(rival.estimator);
+        self.operations += 2 * OPERATIONS_PER_RUPTURE;
+        if nats > ACCEPTED_NATS {
+            self.withdraw_rupture();
+        }
     }
 
     /// The last rupture was a step of the zero.

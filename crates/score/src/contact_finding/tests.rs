@@ -2,14 +2,14 @@ use super::*;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use stylet_core::{EnhanceConfig, Enhancer};
 
 /// One layer of 60 N/m whose surface is at zero and that ruptures at 18 mm, behind which only half of the force is left; 2 mm/s
 /// from `start_m` on, with noise of 20 mN and what is added at a time and place.
 fn finding(start_m: f64, end_m: f64, contact: Contact, added: impl Fn(f64, f64) -> f64) -> ContactFinding {
     let config = EnhanceConfig { contact, ..EnhanceConfig::default() };
+    let mut assessor = ContactAssessor::new(&config, 0.0, Units::default());
     let mut core = Enhancer::new(config, 0.0, []);
-    let (mut assessor, mut rng) = (ContactAssessor::default(), ChaCha8Rng::seed_from_u64(3));
+    let mut rng = ChaCha8Rng::seed_from_u64(3);
     for k in 0..((end_m - start_m) / 1e-5) as u32 {
         let (time_s, position_m) = (0.005 * f64::from(k), start_m + 1e-5 * f64::from(k));
         let z = position_m.max(0.0);
