@@ -1,5 +1,5 @@
 //! Accuracy of the diagnosis on cases of the independent simulator: no false positives on clean data, and most strong effects are
-//! identified. A sample of `stylet benchmark diagnose`.
+//! identified. A sample of `stylet benchmark diagnose`; the longest are run by `tests/accuracy.sh`.
 
 use stylet_diagnose::prediction::{Refit, predict};
 use stylet_diagnose::{NamedRecording, Options};
@@ -64,6 +64,7 @@ fn clean_data_give_no_cause_and_strong_effects_are_identified() {
 
 /// Its force steps at stops and layer boundaries resemble ruptures.
 #[test]
+#[ignore = "a minute; tests/accuracy.sh"]
 fn a_cutting_force_with_steps_like_ruptures_is_identified() {
     let cases: Vec<CaseId> = [Wrong::Nothing, Wrong::ScatterPuncture, Wrong::Thickness]
         .into_iter()
@@ -113,6 +114,7 @@ fn a_shifted_boundary_is_distinguished_from_slightly_wrong_thicknesses() {
 
 /// Not confused with scatter between insertions.
 #[test]
+#[ignore = "a minute; tests/accuracy.sh"]
 fn a_rate_dependent_puncture_force_is_identified_under_wrong_assumptions() {
     let rows = [Wrong::Growing, Wrong::Encoder, Wrong::SurfaceEach, Wrong::ScatterFriction];
     let of = |wrong: Wrong| {
@@ -152,6 +154,7 @@ fn sensor_drift_is_no_boundary_shift_and_hides_no_tone() {
 }
 
 #[test]
+#[ignore = "a minute; tests/accuracy.sh"]
 fn two_time_constants_of_relaxation_are_identified() {
     for terms in [1, 2] {
         let (case, truth) = cases_of("stress_relaxation", Wrong::Nothing, 128, 20)

@@ -22,7 +22,7 @@ const MAX_NOISE_RATIO: f64 = 5.0;
 /// Largest confidence of a cause beside a finding that contradicts the model.
 pub const MAX_CONFIDENCE_CONTRADICTED: f64 = 0.8;
 /// Largest confidence of a cause from one recording, which no prediction confirmed, or from recordings of one motion, under
-/// which causes that depend on time, depth or speed may look alike.
+/// which causes that depend on time, depth or speed may look the same.
 const MAX_CONFIDENCE_FEW: f64 = 0.9;
 /// Recordings have the same motion when their positions differ by at most this share of the travel (RMS).
 const SAME_MOTION_SHARE: f64 = 0.01;
@@ -104,7 +104,7 @@ fn findings(d: &Diagnosis, context: &Context) -> Vec<Finding> {
         1 => Some((FindingKind::OneRecording, "one recording: the model predicted no other")),
         _ if context.one_motion => Some((
             FindingKind::OneMotion,
-            "all recordings have the same motion: causes that differ under another one look alike",
+            "all recordings have the same motion: causes that differ under another one cannot be distinguished",
         )),
         _ => None,
     };

@@ -24,9 +24,9 @@ pub(crate) fn mark_general_forms(causes: &mut [Cause], search: &Search) {
             continue;
         };
         let general = term.info.nested_in.iter().filter_map(|id| effect_info(id));
-        let alike =
+        let special =
             general.filter(|g| !cause.equivalent.iter().any(|e| e == g.id) && is_alike(g, term, &score_test));
-        cause.general_forms = alike.map(|g| g.id.to_owned()).collect();
+        cause.general_forms = special.map(|g| g.id.to_owned()).collect();
         cause.confidence /= 1.0 + cause.general_forms.len() as f64;
     }
 }

@@ -1,4 +1,4 @@
-//! Period of the commanded motion: at its harmonics a cause with a clock of its own cannot be told from any force that
+//! Period of the commanded motion: at its harmonics a cause with a clock of its own cannot be distinguished from any force that
 //! depends on the motion.
 
 use crate::selection_state::Search;

@@ -127,7 +127,7 @@ fn plan_view(report: &PlanReport) -> PlanView {
     let motion = plan.motion.plan();
     let at = |k: usize| plan.duration_s * k as f64 / MOTION_POINTS as f64;
     let decided = match pairs.is_empty() {
-        true => "no remaining pair of candidates can be told apart within these limits".to_owned(),
+        true => "no remaining pair of candidates can be distinguished within these limits".to_owned(),
         false => format!(
             "the next diagnosis names the right cause with probability {}, now {}",
             whole_percent(plan.probability_decided),

@@ -336,6 +336,8 @@ fn a_rupture_resets_counters_and_predictions() {
         // The first rupture gives the final contact position.
         let contact_m = stylet.estimator.start_m - stylet.estimator.previous_thickness_m;
         assert_eq!(stylet.output.contact_m, Some(contact_m));
+        // The first stands.
+        stylet.rival = None;
         stylet.declare_rupture(&step(), &sample(0.02, force_n), 0.0);
         assert_eq!((stylet.output.contact_m, stylet.output.ruptures), (Some(contact_m), 2));
         near(shaft_friction_n(&stylet), (force_n - 0.07).max(0.0));
