@@ -75,7 +75,9 @@ fn refuse_grave(args: &EnhanceArgs, notes: &[QualityNote]) -> Result<(), Failure
     if found.is_empty() {
         return Ok(());
     }
-    Err(Failure::Check(format!("{}: {}", args.data.display(), found.join("; "))))
+    let file = args.data.display();
+    let found = found.join("; ");
+    Err(Failure::Check(format!("{file}: {found}\nlook at the file with: stylet inspect {file} --write-map map.ron")))
 }
 
 fn command(args: &EnhanceArgs) -> String {
