@@ -77,7 +77,9 @@ fn refuse_grave(args: &EnhanceArgs, notes: &[QualityNote]) -> Result<(), Failure
     }
     let file = args.data.display();
     let found = found.join("; ");
-    Err(Failure::Check(format!("{file}: {found}\nlook at the file with: stylet inspect {file} --write-map map.ron")))
+    Err(Failure::Check(format!(
+        "{file}: {found}\nlook at the file with: stylet inspect {file} --write-map map.ron"
+    )))
 }
 
 fn command(args: &EnhanceArgs) -> String {
