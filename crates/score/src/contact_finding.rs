@@ -10,6 +10,10 @@ use stylet_core::{Baseline, BaselineKind, EnhanceConfig, Enhancer, Output, Sampl
 /// Log odds in nats at which the recording begins in the tissue, from the errors of prediction of both starts: these are correlated,
 /// and a start in air is usual.
 const MIN_LOADED_NATS: f64 = 30.0;
+/// Used samples before which the baseline in air is not known.
+const BASELINE_SAMPLES: f64 = 100.0;
+/// Most by which learning a moving baseline on the way raises the variance in air.
+const LEARNING_FACTOR: f64 = 1.2;
 /// Travel below this share of its noise, or of nothing, is no motion, in m.
 const MIN_TRAVEL_M: f64 = 1e-9;
 /// Hypothesis about the beginning of a recording.
@@ -140,14 +144,45 @@ impl ContactFinding {
     }
 }
 
+/// Mean squares in N² of the errors of a start in air and of one in the tissue, and the mean product of neighbouring errors of the first.
+#[derive(Clone, Copy, Debug, Default)]
+struct Errors {
+    air_n2: f64,
+    neighbours_n2: f64,
+    loaded_n2: f64,
+    count: f64,
+}
+
+impl Errors {
+    fn push(&mut self, air_n: f64, before_n: f64, loaded_n: f64) {
+        if !(air_n.is_finite() && before_n.is_finite() && loaded_n.is_finite()) {
+            return;
+        }
+        self.count += 1.0;
+        let share = 1.0 / self.count;
+        self.air_n2 += share * (air_n * air_n - self.air_n2);
+        self.neighbours_n2 += share * (air_n * before_n - self.neighbours_n2);
+        self.loaded_n2 += share * (loaded_n * loaded_n - self.loaded_n2);
+    }
+
+    /// Log odds in nats of a start in the tissue, when the air's errors have this variance.
+    fn nats(&self, air_n2: f64) -> f64 {
+        if self.loaded_n2 > 0.0 { 0.5 * self.count * (air_n2 / self.loaded_n2).ln() } else { 0.0 }
+    }
+}
+
 /// Collects what a finding needs, sample by sample.
 #[derive(Clone, Debug, Default)]
 pub struct ContactAssessor {
     /// The core that starts in the tissue, without stored samples.
     loaded: Option<Enhancer<Vec<Sample>>>,
-    /// Mean squared errors of prediction in N² of the start in air and in the tissue, over so many samples.
-    mean_squares_n2: [f64; 2],
-    count: f64,
+    /// Errors of prediction behind the contact.
+    behind: Errors,
+    /// Deviations from the baseline in air, and errors of the start in the tissue, as long as there is no contact.
+    in_air: Errors,
+    /// The last deviation in N, and the number of used samples.
+    last_deviation_n: f64,
+    used: f64,
     zero_steps: Vec<ZeroStep>,
     last: Option<(Option<f64>, f64, f64)>,
     /// Baseline when the contact was declared.
@@ -181,17 +216,16 @@ impl ContactAssessor {
         let z = sample.position_m;
         let [low, high] = self.span_m.unwrap_or([z; 2]);
         self.span_m = Some([low.min(z), high.max(z)]);
-        if let Some(loaded) =
-            loaded.filter(|o| o.used && out.contact_m.is_some() && sample.velocity_mps > 0.0)
-        {
-            let errors_n = [out.error_n, loaded.error_n];
-            if errors_n.iter().all(|e| e.is_finite()) {
-                self.count += 1.0;
-                for (mean, e) in self.mean_squares_n2.iter_mut().zip(errors_n) {
-                    *mean += (e * e - *mean) / self.count;
-                }
+        self.used += 1.0;
+        let deviation_n = sample.force_n - out.baseline.offset_n;
+        if let Some(loaded) = loaded.filter(|o| o.used && sample.velocity_mps > 0.0) {
+            if out.contact_m.is_some() {
+                self.behind.push(out.error_n, 0.0, loaded.error_n);
+            } else if self.used > BASELINE_SAMPLES {
+                self.in_air.push(deviation_n, self.last_deviation_n, loaded.error_n);
             }
         }
+        self.last_deviation_n = deviation_n;
     }
 
     /// The finding for this setting.
@@ -232,10 +266,15 @@ impl ContactAssessor {
         }
     }
 
-    /// Log odds in nats of a start in the tissue.
+    /// Log odds in nats of a start in the tissue: from what is behind the contact, or without one from the deviations from the
+    /// baseline that the one before does not predict.
     fn loaded_nats(&self) -> f64 {
-        let [in_air, loaded] = self.mean_squares_n2;
-        if loaded > 0.0 { 0.5 * self.count * (in_air / loaded).ln() } else { 0.0 }
+        if self.behind.count > 0.0 {
+            return self.behind.nats(self.behind.air_n2);
+        }
+        let e = &self.in_air;
+        let unpredicted_n2 = e.air_n2 - e.neighbours_n2 * e.neighbours_n2 / e.air_n2.max(f64::MIN_POSITIVE);
+        e.nats(unpredicted_n2 / LEARNING_FACTOR)
     }
 }
 

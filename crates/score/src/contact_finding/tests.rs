@@ -32,7 +32,7 @@ fn every_beginning_has_its_hypothesis_and_the_setting_is_named() {
         (finding(-0.01, 0.015, auto, none), &[H::ConstantOffset], "--contact auto"),
         (finding(-0.01, 0.015, auto, |t, _| 0.02 * t), &[H::DriftOrLine], "one speed"),
         (finding(-0.01, 0.015, auto, |t, _| if t < 2.0 { 1.0 } else { 0.0 }), &[H::ZeroStep], "1 step(s)"),
-        (finding(0.002, 0.03, auto, none), &[H::BeginsLoaded], "use --contact none"),
+        (finding(0.002, 0.03, auto, none), &[H::BeginsLoaded], "as with --contact none"),
         (finding(0.002, 0.03, Contact::None, none), &[H::BeginsLoaded], "--contact none"),
         (finding(-0.02, -0.005, auto, |t, _| 0.02 * t), &[H::NeverTouches], "never touches"),
         (finding(-0.01, 0.015, Contact::Known, none), &[H::ConstantOffset], "--contact known"),
