@@ -58,25 +58,25 @@ def value(diagnosis, parameter):
 def zero_fault(name, path, out):
     found, message = enhance(path, f"{out}/e")
     diagnosis, why = diagnose(path, f"{out}/d")
-    told = found["contact"]["hypothesis"] if found else message.strip()
-    said = f"{told}; {diagnosis['verdict'] if diagnosis else why.strip()} {' + '.join(names(diagnosis))}"
+    hypothesis = found["contact"]["hypothesis"] if found else message.strip()
+    said = f"{hypothesis}; {diagnosis['verdict'] if diagnosis else why.strip()} {' + '.join(names(diagnosis))}"
     number = float((re.findall(r"m?-?\d+\.?\d*", name) or ["0"])[0].replace("m", "-"))
     if name.startswith("air_step"):
-        good = is_phantom(found) and told == "zero_step" and names(diagnosis) == ["zero_step"]
+        good = is_phantom(found) and hypothesis == "zero_step" and names(diagnosis) == ["zero_step"]
         good = good and abs(value(diagnosis, "step_n") + number) < 0.02
     elif name.startswith("tissue_step"):
         steps = found["contact"]["zero_steps"] if found else []
         good = is_phantom(found) and len(steps) == 1 and names(diagnosis) == ["zero_step"]
     elif name.startswith("drift"):
-        good = is_phantom(found) and "drift" in told and names(diagnosis) == ["force_drift"]
+        good = is_phantom(found) and "drift" in hypothesis and names(diagnosis) == ["force_drift"]
         good = good and abs(1e3 * value(diagnosis, "rate_n_per_s") - number) < 0.5
     elif name.startswith("tilt"):
-        good = is_phantom(found, 0.5e-3) and "line" in told and names(diagnosis) == ["position_dependent_force"]
+        good = is_phantom(found, 0.5e-3) and "line" in hypothesis and names(diagnosis) == ["position_dependent_force"]
         good = good and abs(value(diagnosis, "stiffness_n_per_m") - number) < 0.2
     elif name.startswith("bias"):
         good = is_phantom(found) and names(diagnosis) == ["force_bias"] and abs(value(diagnosis, "force_n") - number) < 0.02
     elif name.startswith("begins_loaded"):
-        good = is_phantom(found, contact=False) and told == "begins_loaded" and diagnosis is not None and diagnosis["verdict"] == "none"
+        good = is_phantom(found, contact=False) and hypothesis == "begins_loaded" and diagnosis is not None and diagnosis["verdict"] == "none"
     elif name.startswith("zero_jumps"):
         good = diagnosis is not None and not diagnosis["agrees"] and "zero_step" in names(diagnosis)
     else:  # cyclic motion

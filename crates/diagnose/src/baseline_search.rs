@@ -48,7 +48,7 @@ pub(crate) fn search_with_baseline(
     let dominant = explains && base.rms_n(&data) > DOMINANT_FACTOR * fit.rms_n(&data_of_baseline);
     let from_base = (!dominant).then(|| Search::run(prepared, base.clone(), data, progress));
     let from_base = match from_base {
-        // Where the baseline alone is not enough and other effects are, it is none.
+        // Other effects leave only noise, and the baseline alone does not: no second search.
         Some(s) if !explains && leaves_noise(&s.best, &s.data) => return (s, prepared.clone()),
         other => other,
     };

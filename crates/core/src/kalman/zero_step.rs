@@ -148,7 +148,7 @@ impl KalmanEnhancer {
     #[inline]
     pub(super) fn decide_rival(&mut self, sample: &Sample) -> bool {
         let Some(rival) = &self.rival else { return false };
-        // A layer that pushes the needle is none.
+        // Stiffness and friction are not negative.
         let nats = rival.nats + rival.rupture.negative_nats(&self.noise)
             - rival.estimator.negative_nats(&self.noise);
         if nats > ACCEPTED_NATS {
