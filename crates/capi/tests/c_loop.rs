@@ -39,7 +39,7 @@ fn program() -> PathBuf {
     program
 }
 
-/// Three layers with a little noise from a small generator.
+/// Layers of growing stiffness with a little noise from a small generator.
 fn samples() -> Vec<Sample> {
     let mut state = 1u64;
     (0..60_000)
@@ -50,7 +50,8 @@ fn samples() -> Vec<Sample> {
             let position_m = -0.005 + 2.3e-3 * time_s;
             let layer = (position_m / 0.03).floor().max(0.0);
             let inside = position_m - 0.03 * layer;
-            let elastic = if position_m > 0.0 { 50.0 * inside } else { 0.0 };
+            let stiffness = 50.0 + 30.0 * layer;
+            let elastic = if position_m > 0.0 { stiffness * inside } else { 0.0 };
             let friction = 9000.0 * position_m.max(0.0) * 2.3e-3;
             Sample { time_s, position_m, velocity_mps: 2.3e-3, force_n: elastic + friction + 0.02 * noise }
         })
