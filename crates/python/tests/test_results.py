@@ -30,8 +30,9 @@ def test_an_enhanced_recording_has_intervals_and_a_report(two_gels):
 
 
 def test_every_plot_returns_axes(two_gels):
-    data = stylet.simulate(two_gels).to_pandas()[["time_s", "position_m", "force_n"]]
-    found = stylet.diagnose(two_gels, [data, data], progress=False)
+    columns = ["time_s", "position_m", "force_n"]
+    data = [stylet.simulate(two_gels, seed=seed).to_pandas()[columns] for seed in (1, 2)]
+    found = stylet.diagnose(two_gels, data, progress=False)
     for recording in (0, 1):
         assert found.plot(recording).get_ylabel() == "force (N)"
 
