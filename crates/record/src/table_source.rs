@@ -21,7 +21,7 @@ use crate::text::source::{SourceFile, TextSource, header_start};
 pub struct ReadOptions {
     /// Names and units of another program's log; `None`: Stylet's names, or names and units that are unmistakable.
     pub columns: Option<ColumnMap>,
-    /// Repair time stamps that run backward or repeat, with a [`QualityNote`], instead of refusing them: equal stamps are spread
+    /// Repair time stamps that run backward or repeat, with a [`QualityNote`](crate::QualityNote), instead of refusing them: equal stamps are spread
     /// evenly, and up to 1 % of the rows are dropped.
     pub repair: bool,
 }
