@@ -14,8 +14,9 @@ const MIN_LOADED_NATS: f64 = 30.0;
 const BASELINE_SAMPLES: f64 = 100.0;
 /// Most by which learning a moving baseline on the way raises the variance in air.
 const LEARNING_FACTOR: f64 = 1.2;
-/// Travel below this share of its noise, or of nothing, is no motion, in m.
+/// Travel below this (m) is no motion.
 const MIN_TRAVEL_M: f64 = 1e-9;
+
 /// Hypothesis about the beginning of a recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]

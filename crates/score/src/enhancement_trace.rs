@@ -75,8 +75,21 @@ impl Trace {
         Self::collect(recording, force_n, (config, surface_m), ContactAssessor::default(), model, each)
     }
 
-    /// As [`Trace::run`] for a measured recording, which may begin in the tissue: the finding tells. Optionally with the shaft
-    /// friction of an identified model, see [`EnhancerWithModel`].
+    /// As [`Trace::run`] with the shaft friction of an identified model, see [`EnhancerWithModel`].
+    #[must_use]
+    pub fn run_with_model(
+        recording: &Recording,
+        force_n: &[f64],
+        config: &EnhanceConfig,
+        surface_m: f64,
+        model: impl FnMut(&Sample, usize) -> f64,
+    ) -> Self {
+        let assessor = ContactAssessor::default();
+        Self::collect(recording, force_n, (config, surface_m), assessor, Some(model), |_, _| {})
+    }
+
+    /// As [`Trace::run`] for a measured recording, optionally with the shaft friction of an identified model: a second core shows
+    /// whether the recording begins in the tissue ([`Trace::contact`]).
     #[must_use]
     pub fn run_measured(
         recording: &Recording,

@@ -161,7 +161,7 @@ impl ModelFrictionScore {
         let enhance = |pull: &dyn Fn(f64) -> f64| {
             let force: Vec<f64> =
                 (0..r.len()).map(|i| r.force_n[i] + pull(measured.retracted_m(i))).collect();
-            model().map(|model| Trace::run_measured(r, &force, config, 0.0, Some(model)).enhanced_n)
+            model().map(|model| Trace::run_with_model(r, &force, config, 0.0, model).enhanced_n)
         };
         let plain = enhance(&|_| 0.0)?;
         let (mut pulses, mut steps) = (Vec::new(), Vec::new());
