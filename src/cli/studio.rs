@@ -5,6 +5,7 @@ use crate::cli::exit_codes::Failure;
 use crate::cli::terminal_output::{print, print_error};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::mpsc::channel;
 use stylet_studio::{Server, Studio};
 
 /// Runs the command until it is interrupted.
@@ -26,7 +27,10 @@ pub fn studio(args: &StudioArgs) -> Result<(), Failure> {
     if !args.no_open && !open_browser(&url) {
         print_error("no browser could be started: open the address above\n");
     }
-    server.wait_for_signal().map_err(Failure::internal)
+    let (ended, end) = channel();
+    // The first signal ends it.
+    ctrlc::set_handler(move || ended.send(()).unwrap_or_default()).map_err(Failure::internal)?;
+    end.recv().map_err(Failure::internal)
 }
 
 /// The first folder `stylet-out/studio`, `stylet-out/studio-2`, ... that does not exist.

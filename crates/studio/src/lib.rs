@@ -4,7 +4,9 @@
 mod commands;
 mod dispatch;
 mod explain;
+mod http;
 mod job;
+mod live;
 mod look;
 mod messages;
 mod open;
@@ -18,6 +20,7 @@ mod sliders;
 mod studio;
 mod workspace;
 
+pub use live::LiveServer;
 pub use messages::Problem;
 pub use server::Server;
 pub use studio::Studio;

@@ -123,7 +123,7 @@ pub struct ListenArgs {
     /// Address to receive and serve on; `0.0.0.0` opens it to the network.
     #[arg(long, value_name = "ADDRESS", default_value = "127.0.0.1")]
     pub host: String,
-    /// Serve a page with live curves on this port (0: any free one).
+    /// Serve a page with live curves on this port (0: any free one); needs the feature `studio`, which is on by default.
     #[arg(long, value_name = "PORT")]
     pub page: Option<u16>,
     /// Send every line as a datagram to this address.

@@ -12,13 +12,14 @@ use outputs::{Forwarder, Printer};
 use poll_interval::POLL_INTERVAL;
 use reporter::Reporter;
 use std::io::Read;
-use std::net::TcpListener;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
-use stylet_api::live_stream::{Broadcast, LineSplitter, PageServer, Session, StreamCounts};
+use stylet_api::live_stream::{Broadcast, LineSplitter, Session, StreamCounts};
 use stylet_scenario::EnhancerConfigFile;
+#[cfg(feature = "studio")]
+use stylet_studio::LiveServer;
 use udp_receiver::{Received, UdpReceiver};
 
 /// Longest time after a signal for printing the last lines.
@@ -73,15 +74,7 @@ pub fn listen(args: &ListenArgs) -> Result<(), Failure> {
         Some(to) => Some(Forwarder::start(&broadcast, to, receiver.as_ref().and_then(UdpReceiver::address))?),
         None => None,
     };
-    let mut refused_readers = None;
-    if let Some(port) = args.page {
-        let bind = |why: std::io::Error| Failure::Check(format!("--page {port}: cannot bind: {why}"));
-        let listener = TcpListener::bind((args.host.as_str(), port)).map_err(bind)?;
-        print_error(&format!("live page: http://{}/\n", listener.local_addr().map_err(bind)?));
-        let server = PageServer::new(listener, &args.host, broadcast.clone());
-        refused_readers = Some(server.refused());
-        std::thread::Builder::new().spawn(move || server.serve()).map_err(bind)?;
-    }
+    let page = args.page.map(|port| serve_page(&args.host, port, &broadcast)).transpose()?;
     let end = End::new(args.duration_s)?;
     let only_printed = args.page.is_none() && args.forward.is_none();
     let printer = match args.quiet {
@@ -98,13 +91,38 @@ pub fn listen(args: &ListenArgs) -> Result<(), Failure> {
     let printed = printer.map_or(Ok(()), |printer| printer.finish(wait));
     let counts = StreamCounts {
         dropped_by_system: receiver.as_ref().map_or(Some(0), UdpReceiver::dropped),
-        refused_readers: refused_readers.map_or(0, |count| count.load(Ordering::Relaxed)),
+        refused_readers: page.map_or(0, |page| page.refused()),
         not_forwarded: forwarder.map_or(0, |forwarder| forwarder.finish(wait)),
         ..session.counts()
     };
     let json = serde_json::to_string(&counts).map_err(Failure::internal)?;
     print_error(&format!("{json}\n"));
     read.and(printed)
+}
+
+#[cfg(feature = "studio")]
+fn serve_page(host: &str, port: u16, broadcast: &Arc<Broadcast>) -> Result<LiveServer, Failure> {
+    let page = LiveServer::start(host, port, broadcast.clone())
+        .map_err(|why| Failure::Check(format!("--page {port}: cannot bind: {why}")))?;
+    print_error(&format!("live page: http://{}/\n", page.address()));
+    Ok(page)
+}
+
+/// Stands for the page in a program that was built without it.
+#[cfg(not(feature = "studio"))]
+struct LiveServer;
+
+#[cfg(not(feature = "studio"))]
+impl LiveServer {
+    fn refused(&self) -> u64 {
+        0
+    }
+}
+
+#[cfg(not(feature = "studio"))]
+fn serve_page(_: &str, port: u16, _: &Arc<Broadcast>) -> Result<LiveServer, Failure> {
+    let what = "this program was built without the feature `studio`, which serves the page";
+    Err(Failure::Check(format!("--page {port}: {what}; use --forward")))
 }
 
 fn read_udp(

@@ -5,15 +5,12 @@
 //! subscriber loses the oldest lines; the core never waits for any, and its work does not depend on their number.
 
 mod broadcast;
-mod http_page;
-mod http_request;
 mod line_splitter;
 mod sample_parser;
 mod stream_session;
 mod velocity_from_positions;
 
 pub use broadcast::{Broadcast, Subscriber};
-pub use http_page::{MAX_READERS, MAX_REQUEST_BYTES, PageServer, REQUEST_TIMEOUT};
 pub use line_splitter::{LineSplitter, MAX_LINE_BYTES};
 pub use sample_parser::{InvalidLine, StreamSample, parse_bytes, parse_line};
 pub use stream_session::{Report, Session, StreamCounts};
