@@ -244,8 +244,11 @@ def walk(page, studio, files, workspace, options):
     page.get_by_role("button", name="Write results").first.click()
     page.get_by_text("written to").wait_for()
     check((workspace / "enhanced-b" / "enhance.json").exists(), "stylet enhance's files are written")
+    moved = move_rupture(page)
     page.get_by_role("button", name=re.compile("Start a phantom")).first.click()
     page.wait_for_function("() => !document.getElementById('view-phantom').hidden && document.querySelector('.summary').textContent.includes('along')")
+    face = page.locator("#view-phantom .face").nth(1).get_attribute("aria-valuenow")
+    check(abs(float(face) - moved) < 0.02, f"the phantom's face is where the rupture was dragged: {face} mm")
     drag(page)
     # The phantom of the diagnosis: the two gels without their dry friction.
     text = PHANTOM.replace("    effects: [CoulombFriction(c_n_per_m: 3.0)],\n", "")
@@ -274,6 +277,22 @@ def walk(page, studio, files, workspace, options):
     page.get_by_role("button", name="Save").click()
     page.get_by_text("Saved as phantom.ron").wait_for()
     same_bytes(studio, workspace)
+
+
+def move_rupture(page):
+    """Drags the first rupture 20 pixels deeper; its depth then, in mm."""
+    rupture = page.locator("#view-look .face.rupture").first
+    box, before = rupture.bounding_box(), float(rupture.get_attribute("aria-valuenow"))
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] - 20
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x + 20, y, steps=5)
+    page.mouse.up()
+    page.get_by_role("button", name="Back to what was detected").wait_for()
+    page.wait_for_timeout(300)
+    after = float(rupture.get_attribute("aria-valuenow"))
+    check(after > before, f"a rupture is dragged from {before} to {after} mm")
+    return after
 
 
 def drag(page):

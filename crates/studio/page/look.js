@@ -8,7 +8,7 @@ const AREAS = ["area0", "area1", "area2", "area3"];
 
 export class LookView {
   constructor(root, app) {
-    Object.assign(this, { root, app, algorithms: ["Stylet"], contacts: new Map() });
+    Object.assign(this, { root, app, algorithms: ["Stylet"], corrected: new Map(), handles: [] });
     this.empty = h("div", { class: "drop" }, h("p", {}, "No recording yet."), button("Choose recordings …", () => document.getElementById("chooser").click(), { class: "primary" }));
     this.bar = h("div", { class: "bar" });
     const plots = h("div", { class: "plots" });
@@ -22,7 +22,7 @@ export class LookView {
     link(this.time, this.depth, this.motion, this.speed);
     const zoomed = inOrder(window => this.app.attempt(() => this.load(window)));
     this.moved = zoomed;
-    this.contactHandle();
+    this.bindHandles();
     const wait = { timer: 0 };
     for (const chart of [this.time, this.motion, this.speed]) {
       chart.onzoom = window => { clearTimeout(wait.timer); wait.timer = setTimeout(() => zoomed(window ?? []), 120); };
@@ -30,21 +30,34 @@ export class LookView {
     for (const chart of [this.time, this.depth, this.motion, this.speed]) chart.onhover = index => this.read(index);
   }
 
-  // The depth of the contact that the user gave for the recording shown.
-  contact() { return this.contacts.get(this.app.file) ?? null; }
+  // What the user has moved in the recording shown: the contact, and ruptures as [algorithm, number, depth].
+  corrections() { return this.corrected.get(this.app.file) ?? { contact_mm: null, ruptures_mm: [] }; }
 
-  // The contact can be dragged over depth, or moved with the arrows.
-  contactHandle() {
-    const { u } = this.depth;
-    const element = handle(u, "contact", depth_mm => {
-      this.contacts.set(this.app.file, depth_mm);
-      this.moved([]);
-    });
-    element.classList.add("contact");
+  correct(change) {
+    this.corrected.set(this.app.file, { ...this.corrections(), ...change });
+    this.moved([]);
+  }
+
+  // Contact and ruptures of the first algorithm can be dragged over depth, or moved with the arrows. A new contact means new ruptures.
+  bindHandles() {
+    const moveContact = depth_mm => this.correct({ contact_mm: depth_mm, ruptures_mm: [] });
+    const moveRupture = (number, depth_mm) => {
+      const { algorithm } = this.found.runs[0], others = this.corrections().ruptures_mm.filter(([of, k]) => of !== algorithm || k !== number);
+      this.correct({ ruptures_mm: [...others, [algorithm, number, depth_mm]] });
+    };
+    const contact = handle(this.depth.u, "contact", moveContact);
+    contact.classList.add("contact");
     this.depth.ondraw = () => {
-      const at = this.found?.runs[0]?.contact?.depth_mm ?? null;
-      element.hidden = at === null;
-      if (at !== null) element.place(at);
+      const run = this.found?.runs[0], ruptures = run?.ruptures ?? [];
+      contact.hidden = !run?.contact;
+      if (run?.contact) contact.place(run.contact.depth_mm);
+      while (this.handles.length > ruptures.length) this.handles.pop().remove();
+      while (this.handles.length < ruptures.length) {
+        const number = this.handles.length;
+        this.handles.push(handle(this.depth.u, `rupture ${number + 1}`, depth_mm => moveRupture(number, depth_mm)));
+        this.handles.at(-1).classList.add("rupture");
+      }
+      this.handles.forEach((element, k) => element.place(ruptures[k].depth_mm));
     };
   }
 
@@ -58,7 +71,7 @@ export class LookView {
 
   async load(window) {
     const window_s = window.length === 2 ? window : undefined;
-    const found = await call("look", { file: this.app.file, algorithms: this.algorithms, contact_mm: this.contact(), window_s });
+    const found = await call("look", { file: this.app.file, algorithms: this.algorithms, corrections: this.corrections(), window_s });
     const start = performance.now();
     this.found = found;
     this.draw(found, Boolean(window_s));
@@ -86,7 +99,7 @@ export class LookView {
     const bands = axis => run ? run.layers.map((layer, k) => ({ from: layer[axis][0], to: layer[axis][1], label: layer.label, colour: AREAS[k % 4] })) : [];
     const marks = axis => runs.flatMap(r => [
       ...(r.contact ? [{ x: r.contact[axis], label: "contact", colour: "contact", dash: [3, 3] }] : []),
-      ...r.ruptures.map((rupture, k) => ({ x: rupture[axis], label: `rupture ${k + 1}`, colour: COLOURS[r.algorithm] === "enhanced" ? "rupture" : COLOURS[r.algorithm] }))]);
+      ...r.ruptures.map(rupture => ({ x: rupture[axis], label: rupture.label, colour: COLOURS[r.algorithm] === "enhanced" ? "rupture" : COLOURS[r.algorithm] }))]);
     const inside = bands("time_s").map(band => zoomed ? { ...band, from: Math.max(band.from, curves.time_s[0]), to: Math.min(band.to, curves.time_s.at(-1)) } : band).filter(band => band.to > band.from);
     for (const chart of [this.time, this.depth, this.motion, this.speed]) chart.quiet = true;
     this.time.set({ x: curves.time_s, curves: forces, bands: inside, marks: marks("time_s"), keepRange: zoomed });
@@ -116,21 +129,23 @@ export class LookView {
         h("input", { type: "checkbox", checked: this.algorithms.includes(name), onchange: event => this.choose(name, event.target.checked) }), ` ${name}`))));
     fill(this.side,
       findings(found.findings),
+      found.runs.some(run => run.contact) && h("p", { class: "soft" }, "Wrong contact or rupture? Drag its handle in the plot over depth. ",
+        this.corrected.has(file) && button("Back to what was detected", () => { this.corrected.delete(file); this.moved([]); }, { class: "quiet" })),
       found.runs.map(run => h("section", { class: "card" },
         h("h2", {}, run.algorithm),
-        h("p", {}, run.contact_text, this.contact() !== null && button("as detected", () => { this.contacts.delete(file); this.moved([]); }, { class: "quiet" })),
+        h("p", {}, run.contact_text),
         h("p", {}, `${run.ruptures.length} rupture${run.ruptures.length === 1 ? "" : "s"}`),
         run.table.rows.length > 0 && table(run.table, `layers found by ${run.algorithm}`),
         h("div", { class: "row" },
           button("Start a phantom from these layers →", () => app.attempt(async () => {
-            await call("edit", { edit: { kind: "from_recording", file, algorithm: run.algorithm, contact_mm: this.contact() } });
+            await call("edit", { edit: { kind: "from_recording", file, algorithm: run.algorithm, corrections: this.corrections() } });
             app.views.phantom.along = file;
             app.state = await call("state");
             await app.show("phantom");
             await app.refresh(app.state);
           }), { class: "primary", disabled: !run.contact }),
           button("Write results", () => app.attempt(async () => {
-            const written = await call("enhance", { file, algorithms: [run.algorithm], contact_mm: this.contact() });
+            const written = await call("enhance", { file, algorithms: [run.algorithm], corrections: this.corrections() });
             app.alert(written.summary, "good");
             await app.refresh();
           }))))),

@@ -2,14 +2,15 @@
 
 use crate::commands;
 use crate::messages::*;
+use crate::phantom::MIN_THICKNESS_M;
 use crate::phantom_view::millimetres;
 use crate::preview::curves;
 use crate::studio::Studio;
 use std::sync::Arc;
 use stylet_api::enhancement::{ResultSource, enhance_recording};
 use stylet_api::{AlgorithmRun, EnhancerConfigFile, Recording, enhance};
-use stylet_core::LayerEstimate;
 use stylet_core::config::{Algorithm, Contact};
+use stylet_core::{Detection, LayerEstimate};
 use stylet_record::QualityNote;
 use stylet_report::{plus_minus, significant};
 
@@ -85,7 +86,10 @@ pub fn look(studio: &mut Studio, request: LookRequest) -> Result<LookView, Probl
     let recording = &loaded.recording;
     let mut runs = Vec::new();
     for algorithm in request.algorithms.iter().take(ALGORITHMS.len()) {
-        runs.push((algorithm.as_str(), run_algorithm(studio, &request.file, algorithm, request.contact_mm)?));
+        runs.push((
+            algorithm.as_str(),
+            run_algorithm(studio, &request.file, algorithm, request.corrections.contact_mm)?,
+        ));
     }
     let shown = window(recording, request.window_s);
     let part = |column: &[f64]| column.get(shown.clone()).unwrap_or_default().to_vec();
@@ -112,26 +116,56 @@ pub fn look(studio: &mut Studio, request: LookRequest) -> Result<LookView, Probl
         findings: findings(&loaded.notes),
         samples: [visible.time_s.len(), drawn.time_s.len()],
         curves: drawn,
-        runs: runs.iter().map(|(algorithm, run)| run_view(algorithm, run, recording)).collect(),
+        runs: runs
+            .iter()
+            .map(|(algorithm, run)| run_view(algorithm, run, &request.corrections, recording))
+            .collect(),
         file: request.file,
     })
 }
 
-fn run_view(algorithm: &str, run: &AlgorithmRun, recording: &Recording) -> RunView {
+/// Ruptures of a run; those that the user has moved are where he says: between contact and the neighbours, at the first passage of the tip.
+/// With each comes whether it was moved.
+pub fn corrected_ruptures(
+    algorithm: &str,
+    run: &AlgorithmRun,
+    corrections: &Corrections,
+    recording: &Recording,
+) -> Vec<(Detection, bool)> {
+    let mut ruptures: Vec<_> = run.trace.detections.iter().map(|found| (*found, false)).collect();
+    for (_, number, depth_mm) in corrections.ruptures_mm.iter().filter(|(of, ..)| of == algorithm) {
+        let located_m = |number: usize| ruptures.get(number).map(|(r, _)| r.located_m);
+        let front_m = number.checked_sub(1).map_or(run.trace.contact_m, located_m);
+        let low_m = front_m.map_or(f64::NEG_INFINITY, |front_m| front_m + MIN_THICKNESS_M);
+        let high_m = located_m(number + 1).map_or(f64::INFINITY, |next_m| next_m - MIN_THICKNESS_M);
+        let to_m = (1e-3 * depth_mm).min(high_m).max(low_m);
+        let passage = recording.samples().find(|s| s.position_m >= to_m);
+        if let (Some((rupture, moved)), Some(passage)) = (ruptures.get_mut(*number), passage) {
+            (rupture.located_m, rupture.located_s, *moved) = (to_m, passage.time_s, true);
+        }
+    }
+    ruptures
+}
+
+fn run_view(
+    algorithm: &str,
+    run: &AlgorithmRun,
+    corrections: &Corrections,
+    recording: &Recording,
+) -> RunView {
     let trace = &run.trace;
     let contact = trace.contact_m.zip(trace.contact_s).map(|(z, time_s)| EventView {
         time_s,
         depth_mm: millimetres(z),
         label: "contact".to_owned(),
     });
-    let ruptures: Vec<EventView> = trace
-        .detections
+    let ruptures: Vec<EventView> = corrected_ruptures(algorithm, run, corrections, recording)
         .iter()
         .take(MAX_LISTED)
-        .map(|d| EventView {
-            time_s: d.located_s,
-            depth_mm: millimetres(d.located_m),
-            label: format!("rupture {} by {}", d.layer, d.cause.name()),
+        .map(|(rupture, moved)| EventView {
+            time_s: rupture.located_s,
+            depth_mm: millimetres(rupture.located_m),
+            label: format!("rupture {}{}", rupture.layer, if *moved { ", moved" } else { "" }),
         })
         .collect();
     let mut layers = Vec::new();
@@ -187,7 +221,8 @@ fn layer_row(e: &LayerEstimate) -> Vec<String> {
 /// `stylet enhance` of a recording.
 pub fn write_enhancement(studio: &mut Studio, request: LookRequest) -> Result<RunResultView, Problem> {
     let algorithm = request.algorithms.first().map_or(ALGORITHMS[0].0, String::as_str);
-    let config = config(algorithm, request.contact_mm)?;
+    let contact_mm = request.corrections.contact_mm;
+    let config = config(algorithm, contact_mm)?;
     studio.keep()?;
     let workspace = &studio.workspace;
     let data = workspace.data(&request.file)?;
@@ -196,7 +231,7 @@ pub fn write_enhancement(studio: &mut Studio, request: LookRequest) -> Result<Ru
     let settings: Vec<String> = (algorithm != ALGORITHMS[0].0)
         .then(|| format!("algorithm: {algorithm}"))
         .into_iter()
-        .chain(request.contact_mm.map(|mm| format!("contact: Known, surface_m: {}", 1e-3 * mm)))
+        .chain(contact_mm.map(|mm| format!("contact: Known, surface_m: {}", 1e-3 * mm)))
         .collect();
     let config_file = (!settings.is_empty()).then(|| format!("enhance-{stem}.ron"));
     if let Some(name) = &config_file {

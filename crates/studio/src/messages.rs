@@ -152,7 +152,7 @@ pub enum Edit {
         file: String,
         algorithm: String,
         #[serde(default)]
-        contact_mm: Option<f64>,
+        corrections: Corrections,
     },
     FromDiagnosis,
     FromPlan,
@@ -237,15 +237,25 @@ pub struct EditView {
     pub redo: usize,
 }
 
+/// What the user knows better than the online algorithm.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Corrections {
+    /// Depth of the contact, which the algorithm then takes as known.
+    pub contact_mm: Option<f64>,
+    /// Ruptures that were moved: algorithm, number from 0 in the order of detection, and depth. They change the layers, not the enhanced
+    /// force.
+    pub ruptures_mm: Vec<(String, usize, f64)>,
+}
+
 /// Request for the online algorithm on a recording.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LookRequest {
     pub file: String,
     pub algorithms: Vec<String>,
-    /// Depth of the contact, where the user knows better than the algorithm.
     #[serde(default)]
-    pub contact_mm: Option<f64>,
+    pub corrections: Corrections,
     /// Visible part of the recording in s.
     #[serde(default)]
     pub window_s: Option<[f64; 2]>,

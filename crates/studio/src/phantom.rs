@@ -12,7 +12,7 @@ use stylet_tissue::{
 };
 
 /// Thinnest layer that a dragged face leaves, in m.
-const MIN_THICKNESS_M: f64 = 5e-4;
+pub const MIN_THICKNESS_M: f64 = 5e-4;
 /// Distance from the surface at which the library's motions begin, in m.
 const APPROACH_M: f64 = 5e-3;
 /// Speed of the library's motions, in m/s.
@@ -106,8 +106,8 @@ pub fn edited(studio: &mut Studio, edit: &Edit) -> Result<Scenario, Problem> {
             let (file, text) = SCENARIOS.iter().find(|(known, _)| known == name).ok_or_else(gone)?;
             scenario = parse(file, text)?;
         }
-        Edit::FromRecording { file, algorithm, contact_mm } => {
-            scenario = from_recording(studio, file, algorithm, *contact_mm)?;
+        Edit::FromRecording { file, algorithm, corrections } => {
+            scenario = from_recording(studio, file, algorithm, corrections)?;
         }
         Edit::FromDiagnosis => scenario = studio.explained.extended()?,
         Edit::FromPlan => scenario.motion = studio.explained.planned_motion()?,
@@ -188,11 +188,12 @@ fn from_recording(
     studio: &mut Studio,
     file: &str,
     algorithm: &str,
-    contact_mm: Option<f64>,
+    corrections: &Corrections,
 ) -> Result<Scenario, Problem> {
     let loaded = studio.recording(file)?;
-    let run = look::run_algorithm(studio, file, algorithm, contact_mm)?;
+    let run = look::run_algorithm(studio, file, algorithm, corrections.contact_mm)?;
     let (recording, trace) = (&loaded.recording, &run.trace);
+    let ruptures = look::corrected_ruptures(algorithm, &run, corrections, recording);
     let surface_m = trace.contact_m.ok_or_else(|| {
         Problem::new("no contact was detected in this recording, so there are no layers to start from; see its findings")
     })?;
@@ -201,12 +202,13 @@ fn from_recording(
     let deepest = deepest.unwrap_or(0);
     let mut layers: Vec<Layer> = Vec::new();
     let mut front_m = surface_m;
-    for (k, detection) in trace.detections.iter().enumerate() {
+    for (k, (detection, moved)) in ruptures.iter().enumerate() {
         let estimate = |layer: usize| trace.estimates.iter().find(|e| e.layer == layer);
         let Some(e) = estimate(detection.layer) else { continue };
         // A layer that ruptures before its far face: the tip is free until the next one begins.
-        let next_m = trace.detections.get(k + 1).and_then(|next| Some(estimate(next.layer)?.start_m));
-        let gap_m = next_m.filter(|next_m| *next_m > detection.located_m + MIN_THICKNESS_M);
+        let next_m = ruptures.get(k + 1).and_then(|(next, _)| Some(estimate(next.layer)?.start_m));
+        // A rupture that was moved is the far face.
+        let gap_m = next_m.filter(|next_m| !moved && *next_m > detection.located_m + MIN_THICKNESS_M);
         let puncture_n = gap_m.map(|_| rounded(e.stiffness_n_per_m * (detection.located_m - front_m)));
         let back_m = gap_m.unwrap_or(detection.located_m);
         layers.push(layer(layers.len(), back_m - front_m, e.stiffness_n_per_m, e.friction, puncture_n));
