@@ -325,3 +325,71 @@ fn a_minute_at_one_kilohertz_with_a_subscriber_that_stalls_for_ten_seconds() {
     let counts = over_loopback(60, Duration::from_secs(10));
     assert_eq!((counts["samples"].as_u64(), counts["unused"].as_u64()), (Some(60_000), Some(0)));
 }
+
+/// Requests of every wrong kind, again and again; their number.
+fn attack(address: &str, kind: usize, stop: &std::sync::atomic::AtomicBool) -> usize {
+    let requests: [&[u8]; 6] = [
+        b"GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n",
+        b"GET /events HTTP/1.1\r\nOrigin: https://evil.example\r\n\r\n",
+        b"GET /../../etc/passwd HTTP/1.1\r\n\r\n",
+        b"POST / HTTP/1.1\r\nContent-Length: 10737418240\r\n\r\n",
+        b"\x16\x03\x01\n\n",
+        // Half a head, which stays open.
+        b"GET / HTTP/1.1\r\nHost:",
+    ];
+    let (mut sent, mut open) = (0, Vec::new());
+    while !stop.load(std::sync::atomic::Ordering::Relaxed) {
+        if let Ok(mut stream) = TcpStream::connect(address) {
+            let _ = stream.write_all(requests[(kind + sent) % requests.len()]);
+            sent += 1;
+            open.push(stream);
+        }
+        // Never more than the system allows.
+        open.truncate(100);
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    sent
+}
+
+#[test]
+fn no_sample_is_lost_while_the_page_is_attacked() {
+    const SAMPLES: u64 = 3000;
+    let port = UdpSocket::bind("127.0.0.1:0").and_then(|s| s.local_addr()).expect("a port").port();
+    let mut child = listen(&["--udp", &port.to_string(), "--page", "0", "--quiet"]);
+    let mut stderr = BufReader::new(child.stderr.take().expect("a pipe"));
+    let mut first_line = String::new();
+    stderr.read_line(&mut first_line).expect("the page's address");
+    let address = first_line.trim().trim_start_matches("live page: http://").trim_end_matches('/').to_owned();
+    let stop = std::sync::atomic::AtomicBool::new(false);
+    let socket = UdpSocket::bind("127.0.0.1:0").expect("a socket");
+    socket.connect(("127.0.0.1", port)).expect("connected");
+    let attacks: usize = std::thread::scope(|scope| {
+        let attackers: Vec<_> = (0..4)
+            .map(|kind| {
+                scope.spawn({
+                    let (address, stop) = (&address, &stop);
+                    move || attack(address, kind, stop)
+                })
+            })
+            .collect();
+        let start = Instant::now();
+        for k in 0..SAMPLES {
+            let due = start + Duration::from_micros(k * 1000);
+            std::thread::sleep(due.saturating_duration_since(Instant::now()));
+            socket.send(line(&sample(k)).as_bytes()).expect("sent");
+        }
+        stop.store(true, std::sync::atomic::Ordering::Relaxed);
+        attackers.into_iter().map(|attacker| attacker.join().expect("no panic")).sum()
+    });
+    std::thread::sleep(Duration::from_millis(300));
+    socket.send(b"end").expect("sent");
+    let mut rest = String::new();
+    stderr.read_to_string(&mut rest).expect("the summary");
+    assert!(child.wait().expect("it ends").success());
+    let counts = summary(&rest);
+    println!("{attacks} attacks, {counts}");
+    assert!(attacks > 500, "{attacks} attacks");
+    assert_eq!((counts["samples"].as_u64(), counts["unused"].as_u64()), (Some(SAMPLES), Some(0)));
+    assert_eq!(counts["dropped_by_system"].as_u64().unwrap_or(0), 0);
+    assert!(counts["refused_readers"].as_u64() > Some(0), "held connections fill the places: {counts}");
+}

@@ -47,7 +47,7 @@ export class OpenView {
       const units = column.quantity ? quantity(column.quantity).units : [];
       return h("tr", { class: column.quantity ? "used" : "unused" },
         h("th", { scope: "row" }, column.name),
-        h("td", {}, sketch(column.sketch), h("span", { class: "range" }, column.range)),
+        h("td", {}, sketch(column.sketch || []), h("span", { class: "range" }, column.range)),
         h("td", {}, select(`quantity of ${column.name}`, names, column.quantity, value => this.correct({ ...request, quantity: value, unit: "" }))),
         h("td", {}, units.length > 0 && select(`unit of ${column.name}`, units.includes(column.unit) ? units : [[column.unit, column.unit || "?"], ...units], column.unit, value => this.correct({ ...request, unit: value }))),
         h("td", {}, column.quantity && column.quantity !== "time" && h("label", {}, h("input", { type: "checkbox", checked: column.flipped, onchange: event => this.correct({ ...request, flipped: event.target.checked }) }), " flip sign")),

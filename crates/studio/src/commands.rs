@@ -14,12 +14,15 @@ fn word(text: &str) -> String {
     }
 }
 
-fn path(path: &Path) -> String {
-    word(&path.display().to_string())
-}
-
-fn paths(paths: &[PathBuf]) -> String {
-    paths.iter().map(|p| path(p)).collect::<Vec<_>>().join(" ")
+/// `stylet NAME`, with the options that have values.
+fn shell(name: &str, options: &[(&str, &[&Path])]) -> String {
+    let mut line = format!("stylet {name}");
+    for (option, values) in options.iter().filter(|(_, values)| !values.is_empty()) {
+        let words = values.iter().map(|value| word(&value.display().to_string()));
+        let option = (!option.is_empty()).then(|| (*option).to_owned());
+        option.into_iter().chain(words).for_each(|word| line += &format!(" {word}"));
+    }
+    line
 }
 
 /// A text for Python.
@@ -31,108 +34,85 @@ fn list(of: &[PathBuf]) -> String {
     format!("[{}]", of.iter().map(|p| text(p)).collect::<Vec<_>>().join(", "))
 }
 
+/// `, columns=FILE` for Python, when there is a map.
+fn columns(map: Option<&Path>) -> String {
+    map.map_or_else(String::new, |map| format!(", columns={}", text(map)))
+}
+
 pub fn written(folder: &Path, output: &OutputFiles) -> Vec<String> {
     output.files().map(|(name, _)| folder.join(name).display().to_string()).collect()
 }
 
-fn command(shell: String, python: String, files: Vec<String>) -> CommandView {
+fn command(shell: String, python: &str, files: Vec<String>) -> CommandView {
     CommandView { shell, python: format!("import stylet\n{python}"), files }
 }
 
-/// `--columns FILE`, and the same for Python.
-fn columns(file: Option<&Path>) -> (String, String) {
-    file.map_or_else(Default::default, |f| {
-        (format!(" --columns {}", path(f)), format!(", columns={}", text(f)))
-    })
-}
-
-pub fn open_again(folder: &str) -> CommandView {
-    let shell = format!("stylet studio --out {}", word(folder));
-    CommandView {
-        shell,
-        python: "# the studio is a page; its files are the interface to Python".to_owned(),
-        files: Vec::new(),
-    }
+pub fn open_again(folder: &Path) -> CommandView {
+    let python = "# the studio is a page; its files are the interface to Python".to_owned();
+    CommandView { shell: shell("studio", &[("--out", &[folder])]), python, files: Vec::new() }
 }
 
 pub fn run(scenario: &Path, folder: &Path, output: &OutputFiles) -> CommandView {
     command(
-        format!("stylet run {} --out {}", path(scenario), path(folder)),
-        format!("stylet.simulate({}).write({})", text(scenario), text(folder)),
+        shell("run", &[("", &[scenario]), ("--out", &[folder])]),
+        &format!("stylet.simulate({}).write({})", text(scenario), text(folder)),
         written(folder, output),
     )
 }
 
-pub fn enhance(
-    data: &Path,
-    map: Option<&Path>,
-    config: Option<&Path>,
-    folder: &Path,
-    output: &OutputFiles,
-) -> CommandView {
-    let (shell_map, python_map) = columns(map);
-    let shell_config = config.map(|c| format!(" --config {}", path(c))).unwrap_or_default();
-    let python_config = config.map(|c| format!(", {}", text(c))).unwrap_or_default();
+pub fn enhance(data: &Path, map: Option<&Path>, config: Option<&Path>, folder: &Path) -> CommandView {
+    let config_text = config.map_or_else(String::new, |c| format!(", {}", text(c)));
     command(
-        format!("stylet enhance {}{shell_map}{shell_config} --out {}", path(data), path(folder)),
-        format!("stylet.enhance(stylet.read_csv({}{python_map}){python_config}).plot()", text(data)),
-        written(folder, output),
+        shell(
+            "enhance",
+            &[
+                ("", &[data]),
+                ("--columns", map.as_slice()),
+                ("--config", config.as_slice()),
+                ("--out", &[folder]),
+            ],
+        ),
+        &format!("stylet.enhance(stylet.read_csv({}{}){config_text}).plot()", text(data), columns(map)),
+        Vec::new(),
     )
+}
+
+/// A command on a scenario and recordings, with these further options.
+fn on_data(name: &str, scenario: &Path, inputs: &DiagnosisInputs, further: &[(&str, &[&Path])]) -> String {
+    let data: Vec<&Path> = inputs.data.iter().map(PathBuf::as_path).collect();
+    let map = inputs.columns.as_deref();
+    let options: [(&str, &[&Path]); 3] =
+        [("", &[scenario]), ("--data", data.as_slice()), ("--columns", map.as_slice())];
+    shell(name, &[&options, further].concat())
 }
 
 pub fn diagnose(inputs: &DiagnosisInputs, folder: &Path, output: &OutputFiles) -> CommandView {
-    let (shell_map, python_map) = columns(inputs.columns.as_deref());
+    let (scenario, data) = (text(&inputs.scenario), list(&inputs.data));
+    let map = columns(inputs.columns.as_deref());
     command(
-        format!(
-            "stylet diagnose {} --data {}{shell_map} --out {}",
-            path(&inputs.scenario),
-            paths(&inputs.data),
-            path(folder)
-        ),
-        format!(
-            "found = stylet.diagnose({}, {}{python_map})\nfound.write({})",
-            text(&inputs.scenario),
-            list(&inputs.data),
-            text(folder)
-        ),
+        on_data("diagnose", &inputs.scenario, inputs, &[("--out", &[folder])]),
+        &format!("found = stylet.diagnose({scenario}, {data}{map})\nfound.write({})", text(folder)),
         written(folder, output),
     )
 }
 
 pub fn plan(inputs: &DiagnosisInputs, limits: &Path, motion: &Path) -> CommandView {
-    let (shell_map, python_map) = columns(inputs.columns.as_deref());
-    let data =
-        if inputs.data.is_empty() { String::new() } else { format!(" --data {}", paths(&inputs.data)) };
+    let (scenario, data) = (text(&inputs.scenario), list(&inputs.data));
+    let (map, limits_text) = (columns(inputs.columns.as_deref()), text(limits));
+    let further: [(&str, &[&Path]); 2] = [("--limits", &[limits]), ("--quick --out", &[motion])];
     command(
-        format!(
-            "stylet plan {}{data}{shell_map} --limits {} --quick --out {}",
-            path(&inputs.scenario),
-            path(limits),
-            path(motion)
-        ),
-        format!(
-            "plan = stylet.plan({}, {}, limits={}{python_map}, simulated=False)",
-            text(&inputs.scenario),
-            list(&inputs.data),
-            text(limits)
-        ),
+        on_data("plan", &inputs.scenario, inputs, &further),
+        &format!("plan = stylet.plan({scenario}, {data}, limits={limits_text}{map}, simulated=False)"),
         ["ron", "json", "html"].map(|end| motion.with_extension(end).display().to_string()).to_vec(),
     )
 }
 
 pub fn predict(model: &Path, inputs: &DiagnosisInputs, folder: &Path, output: &OutputFiles) -> CommandView {
-    let (shell_map, python_map) = columns(inputs.columns.as_deref());
+    let data = inputs.data.first().map(|d| text(d)).unwrap_or_default();
+    let map = columns(inputs.columns.as_deref());
     command(
-        format!(
-            "stylet predict {} --data {}{shell_map} --out {}",
-            path(model),
-            paths(&inputs.data),
-            path(folder)
-        ),
-        format!(
-            "found.predict(stylet.read_csv({}{python_map}))   # `found` of stylet.diagnose",
-            inputs.data.first().map(|d| text(d)).unwrap_or_default()
-        ),
+        on_data("predict", model, inputs, &[("--out", &[folder])]),
+        &format!("found.predict(stylet.read_csv({data}{map}))   # `found` of stylet.diagnose"),
         written(folder, output),
     )
 }

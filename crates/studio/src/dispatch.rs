@@ -17,39 +17,33 @@ impl Studio {
     pub fn call(&mut self, name: &str, body: &[u8]) -> Result<Vec<u8>, Problem> {
         self.collect_job();
         match name {
-            "state" => json(&self.state()?),
-            "library" => json(&phantom::library()),
-            "inspect" => json(&open::inspect(self, &required(body)?)?),
-            "column" => json(&open::set_column(self, parse(body)?)?),
-            "forget_map" => json(&open::forget_map(self)?),
+            "state" => json(self.state()?),
+            "library" => json(phantom::library()),
+            "inspect" => json(open::inspect(self, &required(body)?)?),
+            "column" => json(open::set_column(self, parse(body)?)?),
+            "forget_map" => json(open::forget_map(self)?),
             "remove" => {
-                let file = required(body)?;
-                self.workspace.remove(&file)?;
+                self.workspace.remove(&required(body)?)?;
                 self.forget_recordings();
-                json(&self.state()?)
+                json(self.state()?)
             }
-            "look" => json(&look::look(self, parse(body)?)?),
-            "enhance" => json(&look::write_enhancement(self, parse(body)?)?),
-            "preview" => {
-                let request: FileRequest = parse(body)?;
-                json(&preview(self, request.file.as_deref())?)
-            }
-            "edit" => json(&self.edit(parse(body)?)?),
-            "undo" => json(&self.step_back(true)?),
-            "redo" => json(&self.step_back(false)?),
-            "save" => json(&phantom::save(self)?),
-            "run" => json(&phantom::run(self)?),
-            "diagnose" => json(&explain::start_diagnosis(self, parse(body)?)?),
-            "plan" => json(&explain::start_plan(self, parse(body)?)?),
-            "predict" => json(&explain::start_prediction(self, parse(body)?)?),
-            "job" => json(&self.job.as_ref().map(|job| job.view())),
+            "look" => json(look::look(self, parse(body)?)?),
+            "enhance" => json(look::write_enhancement(self, parse(body)?)?),
+            "preview" => json(preview(self, parse::<FileRequest>(body)?.file.as_deref())?),
+            "edit" => json(self.edit(parse(body)?)?),
+            "undo" => json(self.step_back(true)?),
+            "redo" => json(self.step_back(false)?),
+            "save" => json(phantom::save(self)?),
+            "run" => json(phantom::run(self)?),
+            "diagnose" => json(explain::start_diagnosis(self, parse(body)?)?),
+            "plan" => json(explain::start_plan(self, parse(body)?)?),
+            "predict" => json(explain::start_prediction(self, parse(body)?)?),
+            "job" => json(self.job.as_ref().map(|job| job.view())),
             "cancel" => {
-                if let Some(job) = &mut self.job {
-                    job.cancel();
-                }
-                json(&self.job.as_ref().map(|job| job.view()))
+                self.job.iter_mut().for_each(|job| job.cancel());
+                json(self.job.as_ref().map(|job| job.view()))
             }
-            "causes" => json(&explain::without_causes(self, parse(body)?)?),
+            "causes" => json(explain::without_causes(self, parse(body)?)?),
             _ => Err(Problem::new(format!("there is no message {name:?}"))),
         }
     }
@@ -67,7 +61,7 @@ impl Studio {
             // Nothing that the page could show.
             self.workspace.remove(&name)?;
         }
-        json(&found?)
+        json(found?)
     }
 
     fn edit(&mut self, request: EditRequest) -> Result<EditView, Problem> {
@@ -77,12 +71,8 @@ impl Studio {
         let stroke = if moved || same_stroke { request.stroke } else { None };
         self.change(Snapshot { phantom: changed, ..self.now.clone() }, !same_stroke, !request.transient)?;
         self.stroke = stroke;
-        self.edit_view(request.along.as_deref())
-    }
-
-    fn edit_view(&mut self, along: Option<&str>) -> Result<EditView, Problem> {
         Ok(EditView {
-            preview: preview(self, along)?,
+            preview: preview(self, request.along.as_deref())?,
             phantom: view(&self.now.phantom)?,
             undo: self.undo.len(),
             redo: self.redo.len(),
@@ -96,8 +86,8 @@ impl Studio {
     }
 }
 
-fn json(value: &impl Serialize) -> Result<Vec<u8>, Problem> {
-    serde_json::to_vec(value).map_err(|why| Problem::new(format!("internal error: {why}; please report it")))
+fn json(value: impl Serialize) -> Result<Vec<u8>, Problem> {
+    Ok(serde_json::to_vec(&value)?)
 }
 
 fn parse<T: DeserializeOwned>(body: &[u8]) -> Result<T, Problem> {

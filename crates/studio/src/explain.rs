@@ -4,9 +4,10 @@ use crate::commands;
 use crate::messages::*;
 use crate::phantom_view::{segment_text, title};
 use crate::preview::{curves, rms_text};
-use crate::results::{DIAGNOSIS, Diagnosed, EXTENDED, Explained, Job, JobResult, Planned, diagnosis_view};
+use crate::results::{DIAGNOSIS, Diagnosed, EXTENDED, Explained, Job, JobResult, Planned};
 use crate::studio::Studio;
 use crate::workspace::{LIMITS, PHANTOM};
+use serde_json::{Value, json};
 use stylet_api::plan_insertion::{self, PlanReport};
 use stylet_api::prediction_files::{self, ModelOrigin};
 use stylet_api::{DiagnosisInputs, Limits, Scenario, force_along_motion};
@@ -18,16 +19,10 @@ use stylet_tissue::Effect as _;
 
 const PLAN: &str = "plan";
 const PREDICTION: &str = "prediction";
-/// Points of the curve of a planned motion.
-const MOTION_POINTS: usize = 400;
 /// Points of the curves without some of the causes.
 const MAX_POINTS: usize = 3000;
 /// Pairs of candidates that are listed.
 const MAX_PAIRS: usize = 8;
-
-fn failed(why: impl ToString) -> Problem {
-    Problem::new(why.to_string())
-}
 
 /// Phantom, recordings and map as files, for a job.
 fn inputs(studio: &mut Studio, files: &[String]) -> Result<DiagnosisInputs, Problem> {
@@ -43,7 +38,7 @@ fn inputs(studio: &mut Studio, files: &[String]) -> Result<DiagnosisInputs, Prob
     })
 }
 
-fn begun(studio: &mut Studio, job: Job) -> JobView {
+fn begun(studio: &mut Studio, job: Job) -> Value {
     let view = job.view();
     studio.job = Some(job);
     view
@@ -69,7 +64,7 @@ pub fn collect(studio: &mut Studio, result: JobResult) {
     let _ = studio.workspace.record(command);
 }
 
-pub fn start_diagnosis(studio: &mut Studio, request: FilesRequest) -> Result<JobView, Problem> {
+pub fn start_diagnosis(studio: &mut Studio, request: FilesRequest) -> Result<Value, Problem> {
     if request.files.is_empty() {
         return Err(Problem::new("choose at least one recording"));
     }
@@ -77,20 +72,19 @@ pub fn start_diagnosis(studio: &mut Studio, request: FilesRequest) -> Result<Job
     let folder = studio.workspace.path(DIAGNOSIS);
     let job = Job::start("diagnose", move |stage| {
         stage("reading the recordings");
-        let assumed = Scenario::load(&inputs.scenario).map_err(failed)?;
-        let recordings = inputs.read_recordings().map_err(failed)?;
-        let found = stylet_api::diagnose(&assumed, &recordings, stage).map_err(failed)?;
-        let output = found.output(&assumed, &inputs).map_err(failed)?;
+        let assumed = Scenario::load(&inputs.scenario)?;
+        let recordings = inputs.read_recordings()?;
+        let found = stylet_api::diagnose(&assumed, &recordings, stage)?;
+        let output = found.output(&assumed, &inputs)?;
         stage("writing the results");
-        output.write(&folder).map_err(failed)?;
+        output.write(&folder)?;
         let command = commands::diagnose(&inputs, &folder, &output);
-        let view = diagnosis_view(&found.diagnosis);
-        Ok(JobResult::Diagnosed(Box::new(Diagnosed { view, extended: found.extended }), command))
+        Ok(JobResult::Diagnosed(Box::new(Diagnosed::new(&found.diagnosis, found.extended)), command))
     })?;
     Ok(begun(studio, job))
 }
 
-pub fn start_plan(studio: &mut Studio, request: PlanRequest) -> Result<JobView, Problem> {
+pub fn start_plan(studio: &mut Studio, request: PlanRequest) -> Result<Value, Problem> {
     let l = &request.limits;
     let limits = Limits {
         depth_m: 1e-3 * l.depth_mm,
@@ -99,17 +93,17 @@ pub fn start_plan(studio: &mut Studio, request: PlanRequest) -> Result<JobView, 
         duration_s: l.duration_s,
         force_n: l.force_n,
     };
-    limits.check().map_err(failed)?;
+    limits.check()?;
     let inputs = inputs(studio, &request.files)?;
-    let ron = stylet_scenario::ron_options().to_string(&limits).map_err(failed)?;
+    let ron = stylet_scenario::ron_options().to_string(&limits)?;
     studio.workspace.write(LIMITS, format!("Limits{ron}\n").as_bytes())?;
     let limits_file = studio.workspace.path(LIMITS);
     let motion_file = studio.workspace.path("plan/plan.ron");
     let job = Job::start("plan", move |stage| {
-        let limits = plan_insertion::load_limits(&limits_file).map_err(failed)?;
-        let report = plan_insertion::plan(&inputs, (&limits_file, &limits), false, stage).map_err(failed)?;
+        let limits = plan_insertion::load_limits(&limits_file)?;
+        let report = plan_insertion::plan(&inputs, (&limits_file, &limits), false, stage)?;
         stage("writing the plan");
-        report.write(&motion_file).map_err(failed)?;
+        report.write(&motion_file)?;
         let planned = Planned { view: plan_view(&report), motion: report.plan.motion.clone() };
         Ok(JobResult::Planned(Box::new(planned), commands::plan(&inputs, &limits_file, &motion_file)))
     })?;
@@ -120,12 +114,10 @@ fn whole_percent(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)
 }
 
-fn plan_view(report: &PlanReport) -> PlanView {
+fn plan_view(report: &PlanReport) -> Value {
     let plan = &report.plan;
     let mut pairs: Vec<_> = plan.pairs.iter().filter(|p| p.distinguishable).collect();
     pairs.sort_by(|a, b| a.nats_after.total_cmp(&b.nats_after));
-    let motion = plan.motion.plan();
-    let at = |k: usize| plan.duration_s * k as f64 / MOTION_POINTS as f64;
     let decided = match pairs.is_empty() {
         true => "no remaining pair of candidates can be distinguished within these limits".to_owned(),
         false => format!(
@@ -134,33 +126,27 @@ fn plan_view(report: &PlanReport) -> PlanView {
             whole_percent(plan.probability_now)
         ),
     };
-    PlanView {
-        summary: format!(
+    let segments: Vec<_> = match &plan.motion {
+        Motion::Program { segments, .. } => segments.iter().map(segment_text).collect(),
+        _ => Vec::new(),
+    };
+    let rows = pairs.iter().take(MAX_PAIRS).map(|p| {
+        json!([title(&p.a), title(&p.b), significant(p.nats_before, 2), significant(p.nats_after, 3)])
+    });
+    json!({
+        "summary": format!(
             "{} s, to {} mm, at most {} N expected: {decided}.",
             significant(plan.duration_s, 3),
             significant(1e3 * plan.depth_m, 3),
             significant(plan.force_n, 3)
         ),
-        segments: match &plan.motion {
-            Motion::Program { segments, .. } => segments.iter().map(segment_text).collect(),
-            _ => Vec::new(),
-        },
-        pairs: pairs
-            .iter()
-            .take(MAX_PAIRS)
-            .map(|p| {
-                vec![title(&p.a), title(&p.b), significant(p.nats_before, 2), significant(p.nats_after, 3)]
-            })
-            .collect(),
-        time_s: (0..=MOTION_POINTS).map(at).collect(),
-        depth_mm: (0..=MOTION_POINTS)
-            .map(|k| motion.as_ref().map_or(f32::NAN, |m| (1e3 * m.at(at(k)).position_m) as f32))
-            .collect(),
-        folder: PLAN.to_owned(),
-    }
+        "segments": segments,
+        "pairs": rows.collect::<Value>(),
+        "folder": PLAN,
+    })
 }
 
-pub fn start_prediction(studio: &mut Studio, request: FilesRequest) -> Result<JobView, Problem> {
+pub fn start_prediction(studio: &mut Studio, request: FilesRequest) -> Result<Value, Problem> {
     if request.files.is_empty() {
         return Err(Problem::new("choose the recording of the next insertion"));
     }
@@ -172,26 +158,25 @@ pub fn start_prediction(studio: &mut Studio, request: FilesRequest) -> Result<Jo
     let folder = studio.workspace.path(PREDICTION);
     let job = Job::start("predict", move |stage| {
         stage("reading the recordings");
-        let scenario = Scenario::load(&model).map_err(failed)?;
-        let ModelOrigin { diagnosis, assumed } = ModelOrigin::of_model_file(&model, None).map_err(failed)?;
-        let recordings = inputs.read_recordings().map_err(failed)?;
+        let scenario = Scenario::load(&model)?;
+        let ModelOrigin { diagnosis, assumed } = ModelOrigin::of_model_file(&model, None)?;
+        let recordings = inputs.read_recordings()?;
         stage("predicting");
         let (diagnosis, assumed) = (diagnosis.as_ref(), assumed.as_ref());
-        let found = stylet_api::predict_recordings(&scenario, diagnosis, assumed, &[], &recordings)
-            .map_err(failed)?;
-        let output = prediction_files::output_files(&scenario, &model, &found).map_err(failed)?;
+        let found = stylet_api::predict_recordings(&scenario, diagnosis, assumed, &[], &recordings)?;
+        let output = prediction_files::output_files(&scenario, &model, &found)?;
         stage("writing the results");
-        output.write(&folder).map_err(failed)?;
+        output.write(&folder)?;
         let p = &found.prediction;
         let rows = p.recordings.iter().map(|r| {
             let assumed = significant_or_dash(r.assumed_rmse_n, 1.0, 3);
-            vec![r.name.clone(), significant(r.rmse_n, 3), assumed, percent(r.band_coverage)]
+            json!([r.name, significant(r.rmse_n, 3), assumed, percent(r.band_coverage)])
         });
-        let view = PredictionView {
-            sentence: prediction::summary_sentence(p),
-            rows: rows.collect(),
-            folder: PREDICTION.to_owned(),
-        };
+        let view = json!({
+            "sentence": prediction::summary_sentence(p),
+            "rows": rows.collect::<Value>(),
+            "folder": PREDICTION,
+        });
         Ok(JobResult::Predicted(view, commands::predict(&model, &inputs, &folder, &output)))
     })?;
     Ok(begun(studio, job))
@@ -201,18 +186,18 @@ pub fn start_prediction(studio: &mut Studio, request: FilesRequest) -> Result<Jo
 pub fn without_causes(studio: &mut Studio, request: CausesRequest) -> Result<CausesView, Problem> {
     let loaded = studio.recording(&request.file)?;
     let measured_n = &loaded.recording.force_n;
-    let assumed_n = force_along_motion(&studio.now.phantom, &loaded.recording).map_err(failed)?;
+    let assumed_n = force_along_motion(&studio.now.phantom, &loaded.recording)?;
     let mut forces =
         vec![("measured", "measured", measured_n.as_slice()), ("assumed", "phantom", &assumed_n)];
     let mut summary = format!("error of the phantom {}", rms_text(measured_n, &assumed_n));
     let model_n = match &studio.explained.diagnosis {
         Some(diagnosed) => {
             let switched_off = |id: &str| {
-                diagnosed.view.causes.iter().any(|c| c.id == id) && !request.causes.iter().any(|on| on == id)
+                diagnosed.causes.iter().any(|cause| cause == id) && !request.causes.iter().any(|on| on == id)
             };
             let mut model = diagnosed.extended.clone();
             model.effects.retain(|e| !switched_off(e.info().id));
-            force_along_motion(&model, &loaded.recording).map_err(failed)?
+            force_along_motion(&model, &loaded.recording)?
         }
         None => Vec::new(),
     };

@@ -1,6 +1,7 @@
 //! Work in a thread, with its stages and a way to cancel it.
 
-use crate::messages::{JobView, Problem};
+use crate::messages::Problem;
+use serde_json::{Value, json};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -100,14 +101,15 @@ impl<T: Send + 'static> Work<T> {
         (self.state, self.error, self.elapsed_s) = (state, error, self.started.elapsed().as_secs_f64());
     }
 
-    pub fn view(&self) -> JobView {
+    /// What the page shows; `state` is `running`, `done`, `failed` or `cancelled`.
+    pub fn view(&self) -> Value {
         let running = self.is_running();
-        JobView {
-            kind: self.kind,
-            state: self.state,
-            stages: self.progress.lock().unwrap_or_else(PoisonError::into_inner).stages.clone(),
-            elapsed_s: if running { self.started.elapsed().as_secs_f64() } else { self.elapsed_s },
-            error: self.error.clone(),
-        }
+        json!({
+            "kind": self.kind,
+            "state": self.state,
+            "stages": self.progress.lock().unwrap_or_else(PoisonError::into_inner).stages,
+            "elapsed_s": if running { self.started.elapsed().as_secs_f64() } else { self.elapsed_s },
+            "error": self.error,
+        })
     }
 }

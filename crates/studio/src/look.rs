@@ -6,6 +6,7 @@ use crate::phantom::MIN_THICKNESS_M;
 use crate::phantom_view::millimetres;
 use crate::preview::curves;
 use crate::studio::Studio;
+use serde_json::{Value, json};
 use std::sync::Arc;
 use stylet_api::enhancement::{ResultSource, enhance_recording};
 use stylet_api::{AlgorithmRun, EnhancerConfigFile, Recording, enhance};
@@ -56,12 +57,12 @@ pub fn run_algorithm(
     Ok(run)
 }
 
+pub fn finding(blocking: bool, message: &str) -> FindingView {
+    FindingView { level: if blocking { "bad" } else { "warn" }, message: message.to_owned() }
+}
+
 pub fn findings(notes: &[QualityNote]) -> Vec<FindingView> {
-    let finding = |n: &QualityNote| FindingView {
-        level: if n.blocking { "bad" } else { "warn" },
-        message: n.message.clone(),
-    };
-    notes.iter().map(finding).collect()
+    notes.iter().map(|n| finding(n.blocking, &n.message)).collect()
 }
 
 pub fn size_text(recording: &Recording) -> String {
@@ -147,12 +148,7 @@ pub fn corrected_ruptures(
     ruptures
 }
 
-fn run_view(
-    algorithm: &str,
-    run: &AlgorithmRun,
-    corrections: &Corrections,
-    recording: &Recording,
-) -> RunView {
+fn run_view(algorithm: &str, run: &AlgorithmRun, corrections: &Corrections, recording: &Recording) -> Value {
     let trace = &run.trace;
     let contact = trace.contact_m.zip(trace.contact_s).map(|(z, time_s)| EventView {
         time_s,
@@ -168,42 +164,34 @@ fn run_view(
             label: format!("rupture {}{}", rupture.layer, if *moved { ", moved" } else { "" }),
         })
         .collect();
-    let mut layers = Vec::new();
-    let mut front = contact.clone();
-    for (k, rupture) in ruptures.iter().enumerate() {
-        if let Some(front) = &front {
-            layers.push(span(format!("layer {}", k + 1), front, (rupture.depth_mm, rupture.time_s)));
-        }
-        front = Some(rupture.clone());
-    }
+    // The last layer ends at the deepest point.
     let deepest = recording.samples().max_by(|a, b| a.position_m.total_cmp(&b.position_m));
-    if let (Some(front), Some(end)) = (&front, deepest) {
-        layers.push(span(
-            format!("layer {}", layers.len() + 1),
-            front,
-            (millimetres(end.position_m), end.time_s),
-        ));
-    }
-    RunView {
-        algorithm: algorithm.to_owned(),
-        contact_text: match &contact {
+    let end = deepest.map(|s| (millimetres(s.position_m), s.time_s));
+    let faces: Vec<_> =
+        contact.iter().chain(&ruptures).map(|face| (face.depth_mm, face.time_s)).chain(end).collect();
+    let layers = faces.windows(2).enumerate().map(|(k, face)| {
+        json!({
+            "label": format!("layer {}", k + 1),
+            "depth_mm": [face[0].0, face[1].0],
+            "time_s": [face[0].1, face[1].1],
+        })
+    });
+    json!({
+        "algorithm": algorithm,
+        "contact_text": match &contact {
             Some(c) => {
                 format!("contact at {} mm, {} s", significant(c.depth_mm, 4), significant(c.time_s, 4))
             }
             None => "no contact detected: the force never exceeds its noise in air".to_owned(),
         },
-        contact,
-        ruptures,
-        layers,
-        table: TableView {
-            head: ["layer", "from mm", "thick mm", "K N/m", "b N s/m²", "drop N"].map(str::to_owned).to_vec(),
-            rows: trace.estimates.iter().take(MAX_LISTED).map(layer_row).collect(),
+        "contact": contact,
+        "ruptures": ruptures,
+        "layers": layers.collect::<Value>(),
+        "table": {
+            "head": ["layer", "from mm", "thick mm", "K N/m", "b N s/m²", "drop N"],
+            "rows": trace.estimates.iter().take(MAX_LISTED).map(layer_row).collect::<Value>(),
         },
-    }
-}
-
-fn span(label: String, front: &EventView, back: (f64, f64)) -> LayerSpan {
-    LayerSpan { label, depth_mm: [front.depth_mm, back.0], time_s: [front.time_s, back.1] }
+    })
 }
 
 fn layer_row(e: &LayerEstimate) -> Vec<String> {
@@ -219,7 +207,7 @@ fn layer_row(e: &LayerEstimate) -> Vec<String> {
 }
 
 /// `stylet enhance` of a recording.
-pub fn write_enhancement(studio: &mut Studio, request: LookRequest) -> Result<RunResultView, Problem> {
+pub fn write_enhancement(studio: &mut Studio, request: LookRequest) -> Result<Value, Problem> {
     let algorithm = request.algorithms.first().map_or(ALGORITHMS[0].0, String::as_str);
     let contact_mm = request.corrections.contact_mm;
     let config = config(algorithm, contact_mm)?;
@@ -238,20 +226,17 @@ pub fn write_enhancement(studio: &mut Studio, request: LookRequest) -> Result<Ru
         workspace.write(name, format!("Enhance({})\n", settings.join(", ")).as_bytes())?;
     }
     let config_path = config_file.map(|name| workspace.path(&name));
-    let failed = |why: stylet_api::Error| Problem::new(why.to_string());
     // As the command reads it.
-    let (recording, notes) = stylet_record::read_csv(&data, &studio.read_options())
-        .map_err(|why| Problem::new(why.to_string()))?;
+    let (recording, notes) = stylet_record::read_csv(&data, &studio.read_options())?;
     let folder_name = format!("enhanced-{stem}");
     let folder = studio.workspace.path(&folder_name);
     let regressor = config.enhance.model;
-    let result = enhance_recording(recording, notes, config, &[regressor], None).map_err(failed)?;
-    let mut command =
-        commands::enhance(&data, map.as_deref(), config_path.as_deref(), &folder, &Default::default());
+    let result = enhance_recording(recording, notes, config, &[regressor], None)?;
+    let mut command = commands::enhance(&data, map.as_deref(), config_path.as_deref(), &folder);
     let source = ResultSource { data: &data, config: config_path.as_deref(), command: command.shell.clone() };
-    let output = result.output_files(&source).map_err(failed)?;
-    output.write(&folder).map_err(failed)?;
+    let output = result.output_files(&source)?;
+    output.write(&folder)?;
     command.files = commands::written(&folder, &output);
     studio.workspace.record(command)?;
-    Ok(RunResultView { summary: format!("written to {}", folder.display()), folder: folder_name })
+    Ok(json!({ "summary": format!("written to {}", folder.display()), "folder": folder_name }))
 }

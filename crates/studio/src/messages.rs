@@ -1,7 +1,9 @@
-//! Messages between the page and the studio: plain data, JSON on the wire. Everything is ready for display: depths are in mm, numbers that
-//! are printed come as text, sliders as positions. The page computes nothing.
+//! Messages between the page and the studio, JSON on the wire: the requests, and those parts of the answers that several handlers share.
+//! Everything is ready for display: depths are in mm, numbers that are printed come as text, sliders as positions. The page computes
+//! nothing.
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 /// A request that cannot be fulfilled: reason and remedy.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -17,40 +19,10 @@ impl Problem {
     }
 }
 
-/// Everything that the page shows besides curves.
-#[derive(Debug, Serialize)]
-pub struct StateView {
-    pub version: &'static str,
-    pub folder: String,
-    pub files: Vec<String>,
-    pub map: Option<String>,
-    pub phantom: PhantomView,
-    pub commands: Vec<CommandView>,
-    pub undo: usize,
-    pub redo: usize,
-    pub job: Option<JobView>,
-    pub diagnosis: Option<DiagnosisView>,
-    pub plan: Option<PlanView>,
-    pub prediction: Option<PredictionView>,
-    pub limits: LimitsView,
-}
-
-/// Lists that never change.
-#[derive(Debug, Serialize)]
-pub struct LibraryView {
-    pub scenarios: Vec<&'static str>,
-    pub algorithms: Vec<&'static str>,
-    pub motions: Vec<(&'static str, &'static str)>,
-    pub effects: Vec<EffectEntry>,
-}
-
-/// An effect of the gallery.
-#[derive(Debug, Serialize)]
-pub struct EffectEntry {
-    pub id: &'static str,
-    pub title: String,
-    pub equation: &'static str,
-    pub signature: &'static str,
+impl<E: std::error::Error> From<E> for Problem {
+    fn from(why: E) -> Self {
+        Self::new(why.to_string())
+    }
 }
 
 /// A command that repeats what the page did.
@@ -67,37 +39,10 @@ pub struct SliderView {
     pub field: String,
     pub label: String,
     pub unit: &'static str,
-    pub help: String,
+    pub help: &'static str,
     pub position: usize,
     pub positions: usize,
     pub text: String,
-}
-
-/// A phantom.
-#[derive(Debug, Serialize)]
-pub struct PhantomView {
-    pub name: String,
-    pub faces_mm: Vec<f64>,
-    pub layers: Vec<LayerView>,
-    pub effects: Vec<EffectView>,
-    pub tolerances: Vec<SliderView>,
-    pub motion: String,
-    pub ron: String,
-}
-
-/// A layer of a phantom.
-#[derive(Debug, Serialize)]
-pub struct LayerView {
-    pub name: String,
-    pub sliders: Vec<SliderView>,
-}
-
-/// An effect of a phantom.
-#[derive(Debug, Serialize)]
-pub struct EffectView {
-    pub id: &'static str,
-    pub title: String,
-    pub sliders: Vec<SliderView>,
 }
 
 /// A change of the phantom.
@@ -231,7 +176,7 @@ pub struct PreviewView {
 /// Answer to an edit.
 #[derive(Debug, Serialize)]
 pub struct EditView {
-    pub phantom: PhantomView,
+    pub phantom: Value,
     pub preview: PreviewView,
     pub undo: usize,
     pub redo: usize,
@@ -270,34 +215,7 @@ pub struct LookView {
     pub curves: Curves,
     /// Samples in the window, and those sent.
     pub samples: [usize; 2],
-    pub runs: Vec<RunView>,
-}
-
-/// Outputs of an algorithm.
-#[derive(Debug, Serialize)]
-pub struct RunView {
-    pub algorithm: String,
-    pub contact: Option<EventView>,
-    pub contact_text: String,
-    pub ruptures: Vec<EventView>,
-    /// Layers: front and back in mm and s, label.
-    pub layers: Vec<LayerSpan>,
-    pub table: TableView,
-}
-
-/// A layer as found.
-#[derive(Debug, Serialize)]
-pub struct LayerSpan {
-    pub label: String,
-    pub depth_mm: [f64; 2],
-    pub time_s: [f64; 2],
-}
-
-/// A table of texts.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct TableView {
-    pub head: Vec<String>,
-    pub rows: Vec<Vec<String>>,
+    pub runs: Vec<Value>,
 }
 
 /// A finding about a recording.
@@ -306,40 +224,6 @@ pub struct FindingView {
     /// `bad` (a diagnosis is refused), `warn` or `good`.
     pub level: &'static str,
     pub message: String,
-}
-
-/// What was found in a file.
-#[derive(Debug, Serialize)]
-pub struct InspectionView {
-    pub file: String,
-    pub summary: String,
-    pub columns: Vec<ColumnView>,
-    pub findings: Vec<FindingView>,
-    pub readable: bool,
-    pub map: String,
-    /// Quantities that a column can have, with the units of each.
-    pub quantities: Vec<QuantityView>,
-}
-
-/// A quantity.
-#[derive(Debug, Serialize)]
-pub struct QuantityView {
-    pub name: &'static str,
-    pub units: Vec<&'static str>,
-    pub required: bool,
-}
-
-/// A column of a file.
-#[derive(Debug, Serialize)]
-pub struct ColumnView {
-    pub name: String,
-    /// Quantity; empty when the column is not used.
-    pub quantity: &'static str,
-    pub unit: String,
-    pub flipped: bool,
-    pub reason: String,
-    pub range: String,
-    pub sketch: Vec<f32>,
 }
 
 /// A correction of a column.
@@ -382,39 +266,6 @@ pub struct PlanRequest {
     pub limits: LimitsView,
 }
 
-/// Work in a thread.
-#[derive(Clone, Debug, Serialize)]
-pub struct JobView {
-    pub kind: &'static str,
-    /// `running`, `done`, `failed` or `cancelled`.
-    pub state: &'static str,
-    pub stages: Vec<String>,
-    pub elapsed_s: f64,
-    pub error: String,
-}
-
-/// A diagnosis.
-#[derive(Clone, Debug, Serialize)]
-pub struct DiagnosisView {
-    pub sentence: String,
-    pub verdict: String,
-    pub files: Vec<String>,
-    pub causes: Vec<CauseView>,
-    pub gain: String,
-    pub parameters: TableView,
-    pub notes: Vec<String>,
-    pub not_identifiable: Vec<String>,
-    pub folder: String,
-}
-
-/// An identified effect.
-#[derive(Clone, Debug, Serialize)]
-pub struct CauseView {
-    pub id: String,
-    pub title: String,
-    pub lines: Vec<String>,
-}
-
 /// Request for the force without some of the causes.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -428,30 +279,4 @@ pub struct CausesRequest {
 pub struct CausesView {
     pub curves: Curves,
     pub summary: String,
-}
-
-/// A planned insertion.
-#[derive(Clone, Debug, Serialize)]
-pub struct PlanView {
-    pub summary: String,
-    pub segments: Vec<String>,
-    pub pairs: Vec<Vec<String>>,
-    pub time_s: Vec<f64>,
-    pub depth_mm: Vec<f32>,
-    pub folder: String,
-}
-
-/// A prediction.
-#[derive(Clone, Debug, Serialize)]
-pub struct PredictionView {
-    pub sentence: String,
-    pub rows: Vec<Vec<String>>,
-    pub folder: String,
-}
-
-/// Result of a command that ran at once.
-#[derive(Debug, Serialize)]
-pub struct RunResultView {
-    pub summary: String,
-    pub folder: String,
 }

@@ -1,8 +1,9 @@
 //! What is in a file: columns, units, findings of `stylet inspect`; corrections become the column map.
 
-use crate::look::{findings, size_text};
+use crate::look::{finding, findings, size_text};
 use crate::messages::*;
 use crate::studio::{Snapshot, Studio};
+use serde_json::{Value, json};
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::Path;
@@ -24,11 +25,11 @@ const SAME_SCALE: f64 = 1e-9;
 
 /// A unit and its size in SI units.
 type Unit = (&'static str, f64);
-const QUANTITIES: [(&str, &[Unit], bool); 4] = [
-    ("time", &[("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9), ("min", 60.0)], true),
-    ("position", &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("µm", 1e-6), ("inch", 0.0254)], true),
-    ("force", &[("N", 1.0), ("mN", 1e-3), ("gram-force", 9.80665e-3), ("kN", 1e3)], true),
-    ("velocity", &[("m/s", 1.0), ("mm/s", 1e-3)], false),
+const QUANTITIES: [(&str, &[Unit]); 4] = [
+    ("time", &[("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("ns", 1e-9), ("min", 60.0)]),
+    ("position", &[("m", 1.0), ("mm", 1e-3), ("cm", 1e-2), ("µm", 1e-6), ("inch", 0.0254)]),
+    ("force", &[("N", 1.0), ("mN", 1e-3), ("gram-force", 9.80665e-3), ("kN", 1e3)]),
+    ("velocity", &[("m/s", 1.0), ("mm/s", 1e-3)]),
 ];
 
 fn column<'a>(map: &'a ColumnMap, quantity: &str) -> Option<&'a Column> {
@@ -50,7 +51,7 @@ fn set(map: &mut ColumnMap, quantity: &str, column: Option<Column>) {
 }
 
 /// Some values of each column of a text, from evenly spaced rows; `None` for other files and for texts with other columns.
-fn sketches(path: &Path, columns: usize) -> Option<Vec<Vec<f32>>> {
+fn sketches(path: &Path, columns: usize) -> Option<Vec<Vec<f64>>> {
     let mut file = File::open(path).ok()?;
     let size = file.metadata().ok()?.len();
     let mut piece = |from: u64| {
@@ -70,51 +71,46 @@ fn sketches(path: &Path, columns: usize) -> Option<Vec<Vec<f32>>> {
         let split = [';', '\t', '|', ',', ' '].map(|d| cells(row, d));
         let Some(row) = split.iter().find(|row| row.len() == columns) else { continue };
         for (column, cell) in values.iter_mut().zip(row) {
-            column.push(cell.parse().unwrap_or(f32::NAN));
+            column.push(cell.parse().unwrap_or(f64::NAN));
         }
     }
     values.first().is_some_and(|column| column.len() > 1).then_some(values)
 }
 
 /// What is in a file, as the map says.
-pub fn inspect(studio: &mut Studio, file: &str) -> Result<InspectionView, Problem> {
+pub fn inspect(studio: &mut Studio, file: &str) -> Result<Value, Problem> {
     let path = studio.workspace.data(file)?;
     let options = InspectOptions { columns: studio.now.map.clone() };
-    let found = inspect_file(&path, &options).map_err(|why| Problem::new(why.to_string()))?;
+    let found = inspect_file(&path, &options)?;
     let map = studio.now.map.clone().unwrap_or_else(|| found.map.clone());
-    let quantities = QUANTITIES.iter().map(|(name, units, required)| QuantityView {
-        name,
-        units: units.iter().map(|(unit, _)| *unit).collect(),
-        required: *required,
+    let quantities = QUANTITIES.iter().map(|(name, units)| {
+        json!({ "name": name, "units": units.iter().map(|(unit, _)| unit).collect::<Vec<_>>() })
     });
-    let remarks = found
-        .findings
-        .iter()
-        .map(|f| FindingView { level: if f.obstacle { "bad" } else { "warn" }, message: f.message.clone() });
-    let mut view = InspectionView {
-        file: file.to_owned(),
-        summary: format!("{}, {} rows", found.format, found.rows),
-        columns: columns(&map, &found, &path),
-        findings: remarks.collect(),
-        readable: true,
-        map: map.to_ron(),
-        quantities: quantities.collect(),
-    };
-    match studio.recording(file) {
+    let mut remarks: Vec<_> = found.findings.iter().map(|f| finding(f.obstacle, &f.message)).collect();
+    let read = studio.recording(file);
+    let size = match &read {
         Ok(loaded) => {
-            view.summary = format!("{}, {}", found.format, size_text(&loaded.recording));
-            view.findings.retain(|f| f.level != "bad");
-            view.findings.extend(findings(&loaded.notes));
-            view.findings.dedup_by(|a, b| a.message == b.message);
+            remarks.retain(|f| f.level != "bad");
+            remarks.extend(findings(&loaded.notes));
+            remarks.dedup_by(|a, b| a.message == b.message);
+            size_text(&loaded.recording)
         }
         Err(problem) => {
-            view.readable = false;
-            if view.findings.iter().all(|f| f.level != "bad") {
-                view.findings.insert(0, FindingView { level: "bad", message: problem.error });
+            if remarks.iter().all(|f| f.level != "bad") {
+                remarks.insert(0, finding(true, &problem.error));
             }
+            format!("{} rows", found.rows)
         }
-    }
-    Ok(view)
+    };
+    Ok(json!({
+        "file": file,
+        "summary": format!("{}, {size}", found.format),
+        "columns": columns(&map, &found, &path),
+        "findings": remarks,
+        "readable": read.is_ok(),
+        "map": map.to_ron(),
+        "quantities": quantities.collect::<Value>(),
+    }))
 }
 
 /// The column of a map that a column of the file is.
@@ -130,11 +126,11 @@ fn is_column(mapped: &Column, candidate: Option<&Candidate>, number: usize, name
     }
 }
 
-fn columns(map: &ColumnMap, found: &Inspection, path: &Path) -> Vec<ColumnView> {
+fn columns(map: &ColumnMap, found: &Inspection, path: &Path) -> Value {
     let sketches = sketches(path, found.columns.len());
     let view = |c: &InspectedColumn| {
         let candidate = |quantity: &str| found.candidates.iter().find(|k| k.role.name() == quantity);
-        let used = QUANTITIES.iter().find_map(|(quantity, units, _)| {
+        let used = QUANTITIES.iter().find_map(|(quantity, units)| {
             let candidate = candidate(quantity);
             let mapped = column(map, quantity).filter(|m| is_column(m, candidate, c.number, &c.name))?;
             let same = candidate.filter(|k| k.columns.contains(&c.number));
@@ -146,19 +142,17 @@ fn columns(map: &ColumnMap, found: &Inspection, path: &Path) -> Vec<ColumnView> 
             let known = units.iter().find(|(_, size)| same(*size));
             known.map_or(format!("× {}", significant(scale.abs(), 4)), |(unit, _)| (*unit).to_owned())
         });
-        let sketch =
-            sketches.as_ref().and_then(|s| s.get(c.number.checked_sub(1)?)).cloned().unwrap_or_default();
-        ColumnView {
-            name: c.name.clone(),
-            quantity: used.map_or("", |(quantity, ..)| quantity),
-            unit: unit.or_else(|| c.unit.clone()).unwrap_or_default(),
-            flipped: used.is_some_and(|(_, _, scale, _)| scale < 0.0),
-            reason: used.and_then(|(.., candidate)| candidate).map_or(String::new(), |k| k.reason.clone()),
-            range: c.range.map_or(String::new(), |(low, high)| {
-                format!("{} to {}", significant(low, 4), significant(high, 4))
-            }),
-            sketch,
-        }
+        let range = |(low, high)| format!("{} to {}", significant(low, 4), significant(high, 4));
+        json!({
+            "name": c.name,
+            // Empty when the column is not used.
+            "quantity": used.map_or("", |(quantity, ..)| quantity),
+            "unit": unit.or_else(|| c.unit.clone()).unwrap_or_default(),
+            "flipped": used.is_some_and(|(_, _, scale, _)| scale < 0.0),
+            "reason": used.and_then(|(.., candidate)| candidate).map_or("", |k| &k.reason),
+            "range": c.range.map_or(String::new(), range),
+            "sketch": sketches.as_ref().and_then(|s| s.get(c.number.checked_sub(1)?)),
+        })
     };
     found.columns.iter().take(MAX_COLUMNS).map(view).collect()
 }
@@ -177,16 +171,16 @@ pub fn adopt_proposal(studio: &mut Studio, file: &str) -> Result<(), Problem> {
 }
 
 /// Takes a correction into the map.
-pub fn set_column(studio: &mut Studio, request: ColumnRequest) -> Result<InspectionView, Problem> {
+pub fn set_column(studio: &mut Studio, request: ColumnRequest) -> Result<Value, Problem> {
     let options = InspectOptions { columns: studio.now.map.clone() };
     let found = inspect_file(studio.workspace.data(&request.file)?, &options);
-    let found = found.map_err(|why| Problem::new(why.to_string()))?;
+    let found = found?;
     let gone = || Problem::new(format!("the file has no column {:?}", request.column));
     let in_file = found.columns.iter().find(|c| c.name == request.column).ok_or_else(gone)?;
     let (number, of_file) = (in_file.number, in_file.to_si);
     let named = found.text.as_ref().is_none_or(|text| text.names_line.is_some());
     let mut map = studio.now.map.clone().unwrap_or_else(|| found.map.clone());
-    for (quantity, units, _) in QUANTITIES {
+    for (quantity, units) in QUANTITIES {
         let candidate = found.candidates.iter().find(|k| k.role.name() == quantity);
         if quantity == request.quantity {
             let given = units.iter().find(|(unit, _)| *unit == request.unit).map(|(_, size)| *size);
@@ -209,7 +203,7 @@ pub fn set_column(studio: &mut Studio, request: ColumnRequest) -> Result<Inspect
 }
 
 /// Goes back to what is found without a map.
-pub fn forget_map(studio: &mut Studio) -> Result<StateView, Problem> {
+pub fn forget_map(studio: &mut Studio) -> Result<Value, Problem> {
     studio.change(Snapshot { map: None, ..studio.now.clone() }, true, true)?;
     studio.state()
 }

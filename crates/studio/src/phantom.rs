@@ -6,6 +6,7 @@ use crate::sliders::{Scale, rounded};
 use crate::studio::Studio;
 use crate::workspace::PHANTOM;
 use crate::{commands, look};
+use serde_json::{Value, json};
 use stylet_scenario::{Motion, Scenario, Segment};
 use stylet_tissue::{
     AnyEffect, Effect as _, EffectInfo, Layer, effect_info, general_effects, per_layer_effects,
@@ -26,19 +27,15 @@ const MOTIONS: [(&str, &str); 3] = [
     ("varied", "advance, hold, varying speed, retraction: shows most effects"),
 ];
 
-pub fn library() -> LibraryView {
-    let entry = |e: &'static EffectInfo| EffectEntry {
-        id: e.id,
-        title: title(e.id),
-        equation: e.equation,
-        signature: e.signature,
-    };
-    LibraryView {
-        scenarios: SCENARIOS.iter().map(|(name, _)| *name).collect(),
-        algorithms: look::ALGORITHMS.iter().map(|(name, _)| *name).collect(),
-        motions: MOTIONS.to_vec(),
-        effects: general_effects().chain(per_layer_effects()).map(entry).collect(),
-    }
+/// Lists that never change.
+pub fn library() -> Value {
+    let entry = |e: &EffectInfo| json!({ "id": e.id, "title": title(e.id), "equation": e.equation, "signature": e.signature });
+    json!({
+        "scenarios": SCENARIOS.map(|(name, _)| name),
+        "algorithms": look::ALGORITHMS.map(|(name, _)| name),
+        "motions": MOTIONS,
+        "effects": general_effects().chain(per_layer_effects()).map(entry).collect::<Value>(),
+    })
 }
 
 /// The phantom after an edit.
@@ -113,7 +110,7 @@ pub fn edited(studio: &mut Studio, edit: &Edit) -> Result<Scenario, Problem> {
         Edit::FromPlan => scenario.motion = studio.explained.planned_motion()?,
         Edit::Ron { text } => scenario = parse(PHANTOM, text)?,
     }
-    scenario.check().map_err(|why| Problem::new(why.to_string()))?;
+    scenario.check()?;
     Ok(scenario)
 }
 
@@ -235,25 +232,23 @@ fn from_recording(
 }
 
 /// Writes phantom and map.
-pub fn save(studio: &mut Studio) -> Result<StateView, Problem> {
+pub fn save(studio: &mut Studio) -> Result<Value, Problem> {
     studio.keep()?;
-    let folder = studio.folder().display().to_string();
-    studio.workspace.record(commands::open_again(&folder))?;
+    studio.workspace.record(commands::open_again(&studio.folder().to_owned()))?;
     studio.state()
 }
 
 /// `stylet run` of the phantom.
-pub fn run(studio: &mut Studio) -> Result<RunResultView, Problem> {
+pub fn run(studio: &mut Studio) -> Result<Value, Problem> {
     studio.keep()?;
     let file = studio.workspace.path(PHANTOM);
     let name = file.display().to_string();
-    let failed = |why: stylet_api::Error| Problem::new(why.to_string());
     // As the command reads it.
-    let scenario = Scenario::load(&file).map_err(|why| Problem::new(why.to_string()))?;
-    let run = stylet_api::simulate_from(&scenario, &name).map_err(failed)?;
+    let scenario = Scenario::load(&file)?;
+    let run = stylet_api::simulate_from(&scenario, &name)?;
     let folder = studio.workspace.path("simulation");
-    let output = run.output(&name).map_err(failed)?;
-    output.write(&folder).map_err(failed)?;
+    let output = run.output(&name)?;
+    output.write(&folder)?;
     studio.workspace.record(commands::run(&file, &folder, &output))?;
     let first = run.algorithm_runs.first().and_then(|r| r.score.as_ref());
     let found = first.map_or(String::new(), |s| {
@@ -264,5 +259,5 @@ pub fn run(studio: &mut Studio) -> Result<RunResultView, Problem> {
             s.false_alarms
         )
     });
-    Ok(RunResultView { summary: found, folder: "simulation".to_owned() })
+    Ok(json!({ "summary": found, "folder": "simulation" }))
 }

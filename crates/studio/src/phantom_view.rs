@@ -2,6 +2,7 @@
 
 use crate::messages::*;
 use crate::sliders::Scale;
+use serde_json::{Value, json};
 use stylet_scenario::{Motion, Scenario, Segment};
 use stylet_tissue::{AnyEffect, Effect as _, Layer};
 
@@ -29,7 +30,7 @@ pub const SCENARIOS: [(&str, &str); 13] = shipped![
 ];
 
 pub fn parse(file: &str, text: &str) -> Result<Scenario, Problem> {
-    Scenario::parse(file, text).map_err(|why| Problem::new(why.to_string()))
+    Ok(Scenario::parse(file, text)?)
 }
 
 /// The phantom of an empty workspace.
@@ -38,7 +39,7 @@ pub fn first() -> Result<Scenario, Problem> {
 }
 
 pub fn ron(scenario: &Scenario) -> Result<String, Problem> {
-    scenario.to_ron().map_err(|why| Problem::new(format!("internal error: {why}; please report it")))
+    Ok(scenario.to_ron()?)
 }
 
 pub fn title(id: &str) -> String {
@@ -71,45 +72,36 @@ pub fn tolerance<'a>(scenario: &'a mut Scenario, field: &str) -> Option<&'a mut 
     })
 }
 
-pub fn view(scenario: &Scenario) -> Result<PhantomView, Problem> {
+pub fn view(scenario: &Scenario) -> Result<Value, Problem> {
     let tissue = &scenario.tissue;
-    let layer = |layer: &Layer| LayerView {
-        name: layer.name.clone(),
-        sliders: LAYER_FIELDS
-            .iter()
-            .filter_map(|(field, help)| {
-                let value = layer_value(layer, field);
-                Some(Scale::of_layer(field)?.view(field, "", (*help).to_owned(), value))
-            })
-            .collect(),
+    let layer = |layer: &Layer| {
+        let sliders = LAYER_FIELDS.iter().filter_map(|(field, help)| {
+            Some(Scale::of_layer(field)?.view(field, "", help, layer_value(layer, field)))
+        });
+        json!({ "name": layer.name, "sliders": sliders.collect::<Vec<_>>() })
     };
-    let effect = |effect: &AnyEffect| EffectView {
-        id: effect.info().id,
-        title: title(effect.info().id),
-        sliders: effect
-            .info()
-            .parameters
-            .iter()
-            .zip(effect.parameters())
-            .map(|(info, value)| {
-                Scale::of_parameter(info).view(info.path, info.path, info.meaning.to_owned(), Some(value))
-            })
-            .collect(),
+    let effect = |effect: &AnyEffect| {
+        let info = effect.info();
+        let sliders = info.parameters.iter().zip(effect.parameters()).map(|(info, value)| {
+            Scale::of_parameter(info).view(info.path, info.path, info.meaning, Some(value))
+        });
+        json!({ "id": info.id, "title": title(info.id), "sliders": sliders.collect::<Vec<_>>() })
     };
     let mut copy = scenario.clone();
     let mut tolerance_view = |field: &&str| {
         let value = *tolerance(&mut copy, field)?;
-        Some(Scale::of_tolerance(field)?.view(field, "", String::new(), Some(value)))
+        Some(Scale::of_tolerance(field)?.view(field, "", "", Some(value)))
     };
-    Ok(PhantomView {
-        name: scenario.name.clone(),
-        faces_mm: (0..=tissue.layers.len()).map(|face| millimetres(tissue.front_m(face))).collect(),
-        layers: tissue.layers.iter().map(layer).collect(),
-        effects: scenario.effects.iter().map(effect).collect(),
-        tolerances: TOLERANCES.iter().filter_map(&mut tolerance_view).collect(),
-        motion: motion_text(&scenario.motion),
-        ron: ron(scenario)?,
-    })
+    let faces = (0..=tissue.layers.len()).map(|face| millimetres(tissue.front_m(face)));
+    Ok(json!({
+        "name": scenario.name,
+        "faces_mm": faces.collect::<Vec<_>>(),
+        "layers": tissue.layers.iter().map(layer).collect::<Value>(),
+        "effects": scenario.effects.iter().map(effect).collect::<Value>(),
+        "tolerances": TOLERANCES.iter().filter_map(&mut tolerance_view).collect::<Vec<_>>(),
+        "motion": motion_text(&scenario.motion),
+        "ron": ron(scenario)?,
+    }))
 }
 
 /// Millimetres, rounded to 0.1 µm.

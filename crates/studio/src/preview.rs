@@ -36,8 +36,7 @@ fn along_own_motion(mut scenario: Scenario) -> Result<PreviewView, Problem> {
     scenario.sensor = Sensor::ForceTorque(ForceTorque { noise_n: 0.0, ..sensor });
     scenario.sample_hz = scenario.sample_hz.min(MAX_SIMULATED / plan.duration_s().max(1e-3));
     scenario.physics_hz = scenario.sample_hz;
-    let found =
-        stylet_testbed::simulate(&scenario, scenario.seed).map_err(|why| Problem::new(why.to_string()))?;
+    let found = stylet_testbed::simulate(&scenario, scenario.seed)?;
     let forces = [
         ("predicted", "force", found.recording.force_n.as_slice()),
         ("tip", "force at the tip", found.truth.tip_force_n.as_slice()),
@@ -53,9 +52,8 @@ fn along_own_motion(mut scenario: Scenario) -> Result<PreviewView, Problem> {
 }
 
 fn along_recording(scenario: &Scenario, recording: &Recording, file: &str) -> Result<PreviewView, Problem> {
-    let predicted = force_along_motion(scenario, recording).map_err(|why| Problem::new(why.to_string()))?;
-    let law =
-        ForceLaw::new(&scenario.tissue, &scenario.effects).map_err(|why| Problem::new(why.to_string()))?;
+    let predicted = force_along_motion(scenario, recording)?;
+    let law = ForceLaw::new(&scenario.tissue, &scenario.effects)?;
     let mut ruptures = Vec::new();
     let mut tip_n = Vec::with_capacity(recording.len());
     let motion = recording.samples().map(|s| (s.time_s, s.position_m, s.velocity_mps));

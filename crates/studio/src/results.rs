@@ -5,6 +5,7 @@ use crate::messages::*;
 use crate::phantom_view::{millimetres, title};
 use crate::sliders::rounded;
 use crate::workspace::{LIMITS, Workspace};
+use serde_json::{Value, json};
 use stylet_api::{Diagnosis, Limits, Scenario};
 use stylet_report::pages::diagnosis::{recording_differences, summary_sentence};
 use stylet_report::significant;
@@ -21,13 +22,22 @@ pub type Job = Work<JobResult>;
 
 /// A finished diagnosis.
 pub struct Diagnosed {
-    pub view: DiagnosisView,
+    pub view: Value,
+    /// Ids of the identified effects.
+    pub causes: Vec<String>,
     pub extended: Scenario,
+}
+
+impl Diagnosed {
+    pub fn new(diagnosis: &Diagnosis, extended: Scenario) -> Self {
+        let causes = diagnosis.causes.iter().map(|cause| cause.effect.clone()).collect();
+        Self { view: diagnosis_view(diagnosis), causes, extended }
+    }
 }
 
 /// A plan.
 pub struct Planned {
-    pub view: PlanView,
+    pub view: Value,
     pub motion: Motion,
 }
 
@@ -35,7 +45,7 @@ pub struct Planned {
 pub enum JobResult {
     Diagnosed(Box<Diagnosed>, CommandView),
     Planned(Box<Planned>, CommandView),
-    Predicted(PredictionView, CommandView),
+    Predicted(Value, CommandView),
 }
 
 /// The results in the workspace.
@@ -43,7 +53,7 @@ pub enum JobResult {
 pub struct Explained {
     pub diagnosis: Option<Diagnosed>,
     pub plan: Option<Planned>,
-    pub prediction: Option<PredictionView>,
+    pub prediction: Option<Value>,
 }
 
 impl Explained {
@@ -51,8 +61,7 @@ impl Explained {
     pub fn read(workspace: &Workspace) -> Self {
         let read = || {
             let diagnosis = serde_json::from_str(&workspace.read("diagnosis/diagnosis.json")?).ok()?;
-            let extended = Scenario::parse(EXTENDED, &workspace.read(EXTENDED)?).ok()?;
-            Some(Diagnosed { view: diagnosis_view(&diagnosis), extended })
+            Some(Diagnosed::new(&diagnosis, Scenario::parse(EXTENDED, &workspace.read(EXTENDED)?).ok()?))
         };
         Self { diagnosis: read(), ..Self::default() }
     }
@@ -71,7 +80,7 @@ impl Explained {
     }
 }
 
-pub fn diagnosis_view(d: &Diagnosis) -> DiagnosisView {
+fn diagnosis_view(d: &Diagnosis) -> Value {
     let number = |x: f64| significant(x, 4);
     let interval = |low: f64, high: f64| format!("{} to {}", number(low), number(high));
     let causes =
@@ -83,7 +92,7 @@ pub fn diagnosis_view(d: &Diagnosis) -> DiagnosisView {
             if !c.equivalent.is_empty() {
                 lines.push(format!("equivalent: {}", c.equivalent.join(", ")));
             }
-            CauseView { id: c.effect.clone(), title: title(&c.effect), lines }
+            json!({ "id": c.effect, "title": title(&c.effect), "lines": lines })
         });
     let rows = d.base_parameters.iter().map(|p| {
         let whose = if p.layer == 0 { "tissue".to_owned() } else { format!("layer {}", p.layer) };
@@ -92,37 +101,30 @@ pub fn diagnosis_view(d: &Diagnosis) -> DiagnosisView {
             (_, true) => "changed",
             _ => "",
         };
-        vec![
-            whose,
-            p.name.clone(),
-            number(p.assumed),
-            number(p.value),
-            interval(p.low, p.high),
-            remark.to_owned(),
-        ]
+        json!([whose, p.name, number(p.assumed), number(p.value), interval(p.low, p.high), remark])
     });
     let g = &d.gain;
     let what = if g.held_out { "on held-out recordings" } else { "on the one recording, which was fitted" };
     let notes = d.data_quality.iter().map(|q| format!("{}: {}", q.recording, q.note.message));
-    DiagnosisView {
-        sentence: summary_sentence(d),
-        verdict: format!("{:?}", d.verdict).to_lowercase(),
-        files: g.recordings.clone(),
-        causes: causes.collect(),
-        gain: format!(
+    json!({
+        "sentence": summary_sentence(d),
+        "verdict": format!("{:?}", d.verdict).to_lowercase(),
+        "files": g.recordings,
+        "causes": causes.collect::<Value>(),
+        "gain": format!(
             "Residual {what}: {} N before, {} N after; noise {} N.",
             significant(g.rmse_before_n, 3),
             significant(g.rmse_after_n, 3),
             significant(g.floor_n, 3)
         ),
-        parameters: TableView {
-            head: ["", "parameter", "assumed", "fitted", "95 %", ""].map(str::to_owned).to_vec(),
-            rows: rows.collect(),
+        "parameters": {
+            "head": ["", "parameter", "assumed", "fitted", "95 %", ""],
+            "rows": rows.collect::<Value>(),
         },
-        notes: recording_differences(d).into_iter().chain(d.advice.iter().cloned()).chain(notes).collect(),
-        not_identifiable: d.not_identifiable.iter().map(|id| title(id)).collect(),
-        folder: DIAGNOSIS.to_owned(),
-    }
+        "notes": recording_differences(d).into_iter().chain(d.advice.iter().cloned()).chain(notes).collect::<Value>(),
+        "not_identifiable": d.not_identifiable.iter().map(|id| title(id)).collect::<Value>(),
+        "folder": DIAGNOSIS,
+    })
 }
 
 /// The limits of the workspace, or those at first.

@@ -78,7 +78,7 @@ impl Scale {
         Self::new("", info.unit, 1.0, values)
     }
 
-    pub fn view(&self, field: &str, label: &str, help: String, value: Option<f64>) -> SliderView {
+    pub fn view(&self, field: &str, label: &str, help: &'static str, value: Option<f64>) -> SliderView {
         let distance = |stop: f64, value: f64| if stop == value { 0.0 } else { (stop - value).abs() };
         let nearest = |value: f64| {
             let distances = self.values.iter().map(|stop| distance(*stop, value)).enumerate();

@@ -5,6 +5,7 @@ use crate::messages::*;
 use crate::phantom_view::{self, view};
 use crate::results::{Explained, Job, limits};
 use crate::workspace::{MAP, PHANTOM, Workspace};
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use stylet_api::{AlgorithmRun, ColumnMap, NamedRecording, ReadOptions, Recording, Scenario};
@@ -54,8 +55,7 @@ impl Studio {
             Some(text) => phantom_view::parse(PHANTOM, &text)?,
             None => phantom_view::first()?,
         };
-        let map = workspace.read(MAP).map(|text| stylet_scenario::parse(MAP, &text)).transpose();
-        let map = map.map_err(|why| Problem::new(why.to_string()))?;
+        let map = workspace.read(MAP).map(|text| stylet_scenario::parse(MAP, &text)).transpose()?;
         let explained = Explained::read(&workspace);
         let mut studio = Self {
             workspace,
@@ -93,22 +93,23 @@ impl Studio {
         self.workspace.result_file(folder, name)
     }
 
-    pub(crate) fn state(&self) -> Result<StateView, Problem> {
-        Ok(StateView {
-            version: env!("CARGO_PKG_VERSION"),
-            folder: self.workspace.root().display().to_string(),
-            files: self.workspace.files().to_vec(),
-            map: self.now.map.as_ref().map(ColumnMap::to_ron),
-            phantom: view(&self.now.phantom)?,
-            commands: self.workspace.commands().to_vec(),
-            undo: self.undo.len(),
-            redo: self.redo.len(),
-            job: self.job.as_ref().map(|job| job.view()),
-            diagnosis: self.explained.diagnosis.as_ref().map(|d| d.view.clone()),
-            plan: self.explained.plan.as_ref().map(|p| p.view.clone()),
-            prediction: self.explained.prediction.clone(),
-            limits: limits(&self.workspace, &self.now.phantom),
-        })
+    /// Everything that the page shows besides curves.
+    pub(crate) fn state(&self) -> Result<Value, Problem> {
+        Ok(json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "folder": self.workspace.root(),
+            "files": self.workspace.files(),
+            "map": self.now.map.as_ref().map(ColumnMap::to_ron),
+            "phantom": view(&self.now.phantom)?,
+            "commands": self.workspace.commands(),
+            "undo": self.undo.len(),
+            "redo": self.redo.len(),
+            "job": self.job.as_ref().map(|job| job.view()),
+            "diagnosis": self.explained.diagnosis.as_ref().map(|d| &d.view),
+            "plan": self.explained.plan.as_ref().map(|p| &p.view),
+            "prediction": self.explained.prediction,
+            "limits": limits(&self.workspace, &self.now.phantom),
+        }))
     }
 
     /// Makes a change that undo takes back. A workspace that has a folder is kept up to date.
@@ -144,7 +145,7 @@ impl Studio {
         }
     }
 
-    pub(crate) fn step_back(&mut self, back: bool) -> Result<StateView, Problem> {
+    pub(crate) fn step_back(&mut self, back: bool) -> Result<Value, Problem> {
         let (from, to) =
             if back { (&mut self.undo, &mut self.redo) } else { (&mut self.redo, &mut self.undo) };
         if let Some(snapshot) = from.pop() {
@@ -174,8 +175,7 @@ impl Studio {
         if let Some((_, loaded)) = self.loaded.iter().find(|(name, _)| name == file) {
             return Ok(loaded.clone());
         }
-        let read = stylet_api::read_recordings(&[self.workspace.data(file)?], &self.read_options())
-            .map_err(|why| Problem::new(why.to_string()))?;
+        let read = stylet_api::read_recordings(&[self.workspace.data(file)?], &self.read_options())?;
         let Some(NamedRecording { recording, notes, .. }) = read.into_iter().next() else {
             return Err(Problem::new("internal error: nothing was read; please report it"));
         };

@@ -98,7 +98,7 @@ impl Workspace {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(|why| cannot_write(folder, &why))?;
         }
-        write_file_atomically(&path, content).map_err(|why| Problem::new(why.to_string()))
+        Ok(write_file_atomically(&path, content)?)
     }
 
     /// Adds a recording under a safe name, which is returned. One of the same name is replaced.
@@ -150,7 +150,7 @@ impl Workspace {
     }
 
     fn write_journal(&self) -> Result<(), Problem> {
-        let json = to_json_bytes(&self.journal).map_err(|why| Problem::new(why.to_string()))?;
+        let json = to_json_bytes(&self.journal)?;
         self.write(JOURNAL, &json)
     }
 

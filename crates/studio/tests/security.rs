@@ -186,13 +186,36 @@ fn script_in_names_is_kept_as_text_and_does_not_reach_file_names() {
     let (status, answer) = running.call("edit", edit);
     assert_eq!(status, 200);
     assert!(answer.contains("content-type: application/json"), "JSON is never shown as a page");
+    let edit = r#"{"edit":{"kind":"name","name":"<img src=x onerror=alert(2)>"}}"#;
+    assert_eq!(running.call("edit", edit).0, 200);
     let (_, answer) = running.call("save", "{}");
-    assert!(answer.contains("<img src=x onerror=alert(1)>"), "the name is kept as it is");
+    for number in [1, 2] {
+        assert!(
+            answer.contains(&format!("<img src=x onerror=alert({number})>")),
+            "names are kept as they are"
+        );
+    }
+    // A column that is not used, and one that is.
+    let columns = RECORDING.to_vec();
+    let columns =
+        String::from_utf8(columns).expect("text").replace(",force_n", ",<script>alert(3)</script> force [N]");
+    let (status, answer) = running.upload("columns.csv", columns.as_bytes());
+    assert_eq!(status, 200, "{answer}");
+    assert!(
+        answer.contains("content-type: application/json") && answer.contains("<script>alert(3)"),
+        "{answer}"
+    );
     // A report may run its own scripts, but in a sandbox.
     assert_eq!(running.call("run", "{}").0, 200);
     let (_, answer) = running.send(&format!("GET {}/file/simulation/report.html", running.base), &[], b"");
     assert!(answer.contains("content-security-policy: sandbox"), "{}", &answer[..600]);
-    assert!(!answer.contains("<img src=x onerror"), "the report escapes the name");
+    assert!(!answer.contains("<img src=x onerror"), "the report escapes the names");
+    let look = r#"{"file":"columns.csv","algorithms":["Stylet"]}"#;
+    let (status, answer) = running.call("enhance", look);
+    assert_eq!(status, 200, "{answer}");
+    let (_, answer) =
+        running.send(&format!("GET {}/file/enhanced-columns/report.html", running.base), &[], b"");
+    assert!(!answer.contains("<script>alert(3)"), "the report escapes the column");
 }
 
 #[test]
@@ -202,6 +225,22 @@ fn an_upload_of_10_gb_and_a_message_of_2_mb_are_refused() {
     assert_eq!(running.send(&upload, &["Content-Length: 10737418240"], b"time_s").0, 413);
     let (status, _) = running.call("state", &" ".repeat(2 << 20));
     assert_eq!(status, 413);
+    assert_eq!(running.call("state", "{}").0, 200);
+    assert!(!running.folder.join("data").join("a.csv").exists());
+}
+
+#[test]
+fn an_upload_without_a_length_is_cut_off_at_its_limit() {
+    let running = Running::start("endless");
+    let mut stream = TcpStream::connect(&running.host).expect("a connection");
+    let head = format!(
+        "POST {}/upload/a.csv HTTP/1.1\r\nHost: {}\r\nTransfer-Encoding: chunked\r\n\r\n",
+        running.base, running.host
+    );
+    stream.write_all(head.as_bytes()).expect("sent");
+    let piece = [b"100000\r\n".as_slice(), &vec![b'1'; 1 << 20], b"\r\n"].concat();
+    let sent_mb = (0..2000).take_while(|_| stream.write_all(&piece).is_ok()).count();
+    assert!((500..600).contains(&sent_mb), "{sent_mb} MB were taken");
     assert_eq!(running.call("state", "{}").0, 200);
     assert!(!running.folder.join("data").join("a.csv").exists());
 }
