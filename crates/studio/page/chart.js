@@ -5,8 +5,16 @@ const FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-
 const KEY_STEP_MM = { plain: 0.5, shift: 0.1 };
 const charts = new Set();
 
-export function colour(name) { return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim(); }
-export function redrawAll() { for (const chart of charts) { chart.paintLegend(); chart.u.redraw(false, true); } }
+// The colours of the theme; asking the style sheet in every frame would lay out the page each time.
+const colours = new Map();
+export function colour(name) {
+  if (!colours.has(name)) colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
+  return colours.get(name);
+}
+export function redrawAll() {
+  colours.clear();
+  for (const chart of charts) { chart.named = null; chart.paintLegend(); chart.u.redraw(false, true); }
+}
 
 const isNumber = v => v !== null && v === v;
 
@@ -103,6 +111,9 @@ export class Chart {
   paintLegend() {
     const names = new Map();
     for (const curve of this.curves) if (!names.has(curve.name)) names.set(curve.name, curve);
+    const named = JSON.stringify([this.marks.length > 0, ...[...names.keys()].map(name => [name, this.hidden.has(name)])]);
+    if (named === this.named) return;
+    this.named = named;
     if (names.size < 2 && !this.marks.length) { fill(this.legend); return; }
     const items = [...names.values()].map(curve => {
       const swatch = h("span", { class: `swatch ${curve.dash ? "dashed" : ""}`, "aria-hidden": "true" });
@@ -273,12 +284,13 @@ export class Chart {
 export function handle(u, name, moved, grabbed = () => {}) {
   const element = h("div", { class: "face", role: "slider", tabindex: "0", "aria-orientation": "horizontal", "aria-label": name });
   const depthAt = event => u.posToVal(event.clientX - u.over.getBoundingClientRect().left, "x");
-  let at = 0;
+  let at = null, place = null;
   element.place = depth => {
     const left = u.valToPos(depth, "x");
-    at = depth;
-    element.style.left = `${left}px`;
-    element.hidden = !(left >= -2 && left <= u.over.clientWidth + 2);
+    element.hidden = !(left >= -2 && left <= u.bbox.width / uPlot.pxRatio + 2);
+    if (depth === at && left === place) return;
+    [at, place] = [depth, left];
+    element.style.transform = `translateX(${left}px)`;
     element.setAttribute("aria-valuenow", depth);
     element.setAttribute("aria-valuetext", `${depth} mm`);
   };

@@ -54,6 +54,7 @@ export function slider(view, change) {
     h("label", { for: id }, view.label), range, number, h("span", { class: "unit" }, view.unit));
   let drawn = null;
   row.update = now => {
+    if (drawn && range.value === String(now.position) && number.value === now.text) return;
     drawn = now;
     if (document.activeElement !== range || Number(range.value) !== now.position) range.value = String(now.position);
     if (document.activeElement !== number) number.value = now.text;

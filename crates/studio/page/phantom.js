@@ -40,13 +40,21 @@ export class PhantomView {
 
   discrete(edit) { this.stroke++; return this.edit(edit); }
 
+  // The answer is drawn in the next frame, while the studio computes the next one.
   async deliver(request) {
     const answer = await call("edit", request);
     Object.assign(this.app.state, { phantom: answer.phantom, undo: answer.undo, redo: answer.redo });
+    if (!this.latest) requestAnimationFrame(() => this.paint());
+    this.latest = { answer, transient: request.transient };
+  }
+
+  paint() {
+    const { answer, transient } = this.latest;
+    this.latest = null;
     document.getElementById("undo").disabled = !answer.undo;
     document.getElementById("redo").disabled = !answer.redo;
-    this.panel(answer.phantom, !request.transient);
-    this.draw(answer.preview, request.transient);
+    this.panel(answer.phantom, !transient);
+    this.draw(answer.preview, transient);
     this.frames = (this.frames || 0) + 1;
     this.root.dataset.frames = this.frames;
   }
@@ -124,10 +132,10 @@ export class PhantomView {
     const { app } = this;
     fill(this.bar,
       select("start from", [["", "start from …"], ...app.library.scenarios], "", name => { if (name) { this.along = null; this.discrete({ kind: "scenario", name }); } }),
-      select("motion", [["", "its own motion"], ...app.state.files.map(file => [file, `along ${file}`])], this.along || "", file => { this.along = file || null; app.attempt(() => this.update()); }),
+      select("motion", [["", "along its own motion"], ...app.state.files.map(file => [file, `along ${file}`])], this.along || "", file => { this.along = file || null; app.attempt(() => this.update()); }),
       !this.along && select("another motion", [["", phantom.motion.length > 46 ? phantom.motion.slice(0, 45) + "…" : phantom.motion], ...app.library.motions], "", name => { if (name) this.discrete({ kind: "motion", name }); }),
       app.state.plan && button("Use the planned motion", () => { this.along = null; this.discrete({ kind: "from_plan" }); }),
-      app.state.files.length === 0 && h("span", { class: "soft" }, "Drop a recording anywhere on the page to compare it with this phantom."),
+      app.state.files.length === 0 && h("span", { class: "soft" }, "Drag the faces by their handles or move the sliders: the force follows. Drop a recording anywhere on the page to compare it with this phantom."),
       app.state.files.length > 0 && button("Explain →", () => app.show("explain"), { class: "primary right" }));
   }
 
