@@ -227,6 +227,23 @@ def walk(page, studio, files, workspace, options):
             forget.click()
         page.get_by_role("button", name=f"Remove {name}").wait_for(state="hidden")
     check(True, "ten files of other programs are read without a click")
+    # A file without time needs its sampling rate.
+    (files["a"].parent / "no_time.csv").write_text("\n".join(["position_m,force_n"] + [f"{row[1]},{row[2]}" for row in files["table"]]))
+    drop(page, files["a"].parent / "no_time.csv")
+    page.get_by_label("samples per second").fill("200")
+    page.get_by_role("button", name="Use it").click()
+    page.get_by_text("text table, 7600 samples over 37.99 s at 200 Hz").wait_for()
+    page.get_by_role("button", name="Look at it").click()
+    page.wait_for_function("() => document.getElementById('view-look').dataset.drawn?.startsWith('no_time.csv')")
+    check("rate_hz: 200" in (workspace / "columns.ron").read_text(), "a file without time is read with the sampling rate that the user gives")
+    page.keyboard.press("1")
+    page.get_by_role("button", name="Forget the map").click()
+    page.get_by_role("button", name="Remove no_time.csv").click()
+    # A scenario is a phantom.
+    (files["a"].parent / "assumed.ron").write_text(PHANTOM.replace("two gels", "dropped phantom"))
+    drop(page, files["a"].parent / "assumed.ron")
+    page.wait_for_function("() => document.querySelector('#view-phantom .name')?.value === 'dropped phantom'")
+    check(True, "a scenario that is dropped becomes the phantom")
     # A long recording is drawn at once.
     begin = time.time()
     drop(page, files["long"])
@@ -295,25 +312,43 @@ def move_rupture(page):
     return after
 
 
+# One movement of the pointer per frame for two seconds, as a mouse gives; Playwright's own mouse waits for the browser after each one.
+FRAME_RATE = """async () => {
+  const face = document.querySelectorAll('#view-phantom .face')[1], view = document.getElementById('view-phantom'), frames = () => Number(view.dataset.frames);
+  Object.assign(face, { setPointerCapture() {}, releasePointerCapture() {}, hasPointerCapture: () => true });
+  const x = face.getBoundingClientRect().left, send = (kind, dx) => face.dispatchEvent(new PointerEvent(kind, { clientX: x + dx, pointerId: 1, bubbles: true }));
+  send('pointerdown', 0);
+  const before = frames(), begin = performance.now();
+  for (let step = 0; performance.now() - begin < 2000; step++) {
+    await new Promise(requestAnimationFrame);
+    send('pointermove', step % 60);
+  }
+  const rate = (frames() - before) / (performance.now() - begin) * 1000;
+  send('pointerup', 60);
+  for (const name of ['setPointerCapture', 'releasePointerCapture', 'hasPointerCapture']) delete face[name];
+  return rate;
+}"""
+
+
 def drag(page):
     face = page.locator("#view-phantom .face").nth(1)
     box = face.bounding_box()
     before = face.get_attribute("aria-valuenow")
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     page.mouse.down()
-    frames, begin = int(page.locator("#view-phantom").get_attribute("data-frames") or 0), time.time()
-    steps = 60
-    for step in range(steps):
+    for step in range(60):
         page.mouse.move(box["x"] + box["width"] / 2 + step, box["y"] + box["height"] / 2)
-        page.evaluate("() => new Promise(requestAnimationFrame)")
-    elapsed = time.time() - begin
-    frames = int(page.locator("#view-phantom").get_attribute("data-frames")) - frames
     page.mouse.up()
-    page.wait_for_timeout(200)
-    check(face.get_attribute("aria-valuenow") != before, f"a dragged face redraws at {frames / elapsed:.0f} frames per second")
+    page.wait_for_timeout(300)
+    check(face.get_attribute("aria-valuenow") != before, "a face is dragged")
     page.keyboard.press("Control+z")
     page.wait_for_function("([n, v]) => document.querySelectorAll('#view-phantom .face')[n].getAttribute('aria-valuenow') === v", arg=[1, before])
     check(True, "one undo takes the whole movement back")
+    rate = page.evaluate(FRAME_RATE)
+    page.wait_for_timeout(300)
+    check(rate > 10, f"a dragged face redraws at {rate:.0f} frames per second")
+    page.keyboard.press("Control+z")
+    page.wait_for_function("([n, v]) => document.querySelectorAll('#view-phantom .face')[n].getAttribute('aria-valuenow') === v", arg=[1, before])
 
 
 def same_bytes(studio, workspace):

@@ -56,10 +56,19 @@ export const app = {
 
   // Stores files and goes on to what needs attention: the columns when something is wrong, else the curves.
   async addFiles(files) {
-    let last = null;
+    let last = null, phantom = null;
     for (const file of files) {
+      if (file.name.endsWith(".ron")) {
+        phantom = await this.attempt(async () => call("edit", { edit: { kind: "ron", text: await file.text() } }));
+        continue;
+      }
       const found = await this.attempt(() => upload(file));
       if (found) { last = found; this.views.open.remember(found); }
+    }
+    if (phantom && !last) {
+      this.state = await call("state");
+      await this.show("phantom");
+      await this.refresh(this.state);
     }
     if (!last) return;
     this.file = last.file;

@@ -159,7 +159,7 @@ export class ExplainView {
             await this.app.refresh(this.app.state);
           }))), this.frame("Plan", `${plan.folder}/plan.html`))),
       h("section", { class: "card" }, h("h2", {}, "Does it predict the next recording?"),
-        state.files.length === 0 ? h("p", { class: "soft" }, "Drop the recording of the next insertion.") : further,
+        h("p", { class: "soft" }, `Drop the recording of the next insertion${state.files.length > 0 ? ", then choose it" : ""}.`), state.files.length > 0 && further,
         prediction && h("div", {}, h("p", {}, prediction.sentence),
           table({ head: ["recording", "RMS N", "assumed", "in band"], rows: prediction.rows }, "prediction"), this.frame("Prediction", `${prediction.folder}/report.html`))));
   }

@@ -30,13 +30,20 @@ export class OpenView {
     this.show(found);
   }
 
-  async correct(request) {
+  async correct(request, message = "column") {
     await this.app.attempt(async () => {
-      const found = await call("column", request);
+      const found = await call(message, request);
       this.known.clear();
       this.remember(found);
       await this.app.refresh();
     });
+  }
+
+  // For a file without time, or with a sample number in its place.
+  rate(file) {
+    const number = h("input", { type: "text", inputmode: "decimal", size: "6", "aria-label": "samples per second" });
+    const use = event => { event.preventDefault(); this.correct({ file, rate_hz: Number(number.value.replace(",", ".")) || 0 }, "rate"); };
+    return h("form", { class: "inline", onsubmit: use }, "No column with the time? Samples per second", number, h("button", { type: "submit" }, "Use it"));
   }
 
   show(found) {
@@ -53,6 +60,7 @@ export class OpenView {
         h("td", {}, column.quantity && column.quantity !== "time" && h("label", {}, h("input", { type: "checkbox", checked: column.flipped, onchange: event => this.correct({ ...request, flipped: event.target.checked }) }), " flip sign")),
         h("td", { class: "soft" }, column.reason));
     });
+    const guessed = !this.app.state.map && found.readable && found.findings.some(f => f.level === "bad") && found.columns.find(c => c.quantity === "position");
     fill(this.found,
       h("h2", {}, found.file),
       h("p", {}, found.summary),
@@ -61,6 +69,8 @@ export class OpenView {
         h("thead", {}, h("tr", {}, ["column", "values", "is", "in", "sign", "because"].map(name => h("th", { scope: "col" }, name)))),
         h("tbody", {}, rows))),
       h("div", { class: "row" },
+        guessed && button(`The position is in ${guessed.unit}: use it`, () => this.correct({ file: found.file, column: guessed.name, quantity: "position", unit: guessed.unit, flipped: guessed.flipped })),
+        !found.readable && this.rate(found.file),
         button("Look at it →", () => this.app.show("look"), { class: "primary", disabled: !found.readable }),
         this.app.state.map && button("Forget the map", () => this.app.attempt(async () => { this.known.clear(); await this.app.refresh(await call("forget_map")); }))),
       h("details", {}, h("summary", {}, this.app.state.map ? "Column map, saved as columns.ron" : "Column map"), h("pre", { tabindex: "0" }, found.map)));

@@ -21,6 +21,7 @@ impl Studio {
             "library" => json(phantom::library()),
             "inspect" => json(open::inspect(self, &required(body)?)?),
             "column" => json(open::set_column(self, parse(body)?)?),
+            "rate" => json(open::set_rate(self, parse(body)?)?),
             "forget_map" => json(open::forget_map(self)?),
             "remove" => {
                 self.workspace.remove(&required(body)?)?;

@@ -240,6 +240,14 @@ pub struct ColumnRequest {
     pub flipped: bool,
 }
 
+/// The sampling rate of a file without usable times.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RateRequest {
+    pub file: String,
+    pub rate_hz: f64,
+}
+
 /// Request for a diagnosis or a prediction.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]

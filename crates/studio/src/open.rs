@@ -202,6 +202,17 @@ pub fn set_column(studio: &mut Studio, request: ColumnRequest) -> Result<Value, 
     inspect(studio, &request.file)
 }
 
+/// Takes the sampling rate of a file without usable times into the map.
+pub fn set_rate(studio: &mut Studio, request: RateRequest) -> Result<Value, Problem> {
+    let path = studio.workspace.data(&request.file)?;
+    let options = InspectOptions { columns: studio.now.map.clone() };
+    let mut map = studio.now.map.clone().map_or_else(|| inspect_file(path, &options).map(|f| f.map), Ok)?;
+    (map.rate_hz, map.time.scale) = (Some(request.rate_hz), None);
+    map.check()?;
+    studio.change(Snapshot { map: Some(map), ..studio.now.clone() }, true, true)?;
+    inspect(studio, &request.file)
+}
+
 /// Goes back to what is found without a map.
 pub fn forget_map(studio: &mut Studio) -> Result<Value, Problem> {
     studio.change(Snapshot { map: None, ..studio.now.clone() }, true, true)?;

@@ -83,7 +83,7 @@ pub fn view(scenario: &Scenario) -> Result<Value, Problem> {
     let effect = |effect: &AnyEffect| {
         let info = effect.info();
         let sliders = info.parameters.iter().zip(effect.parameters()).map(|(info, value)| {
-            Scale::of_parameter(info).view(info.path, info.path, info.meaning, Some(value))
+            Scale::of_parameter(info).view(info.path, info.meaning, info.path, Some(value))
         });
         json!({ "id": info.id, "title": title(info.id), "sliders": sliders.collect::<Vec<_>>() })
     };

@@ -3,13 +3,14 @@
 use crate::job::Work;
 use crate::messages::*;
 use crate::phantom_view::{millimetres, title};
-use crate::sliders::rounded;
+use crate::sliders::{named, rounded};
 use crate::workspace::{LIMITS, Workspace};
 use serde_json::{Value, json};
 use stylet_api::{Diagnosis, Limits, Scenario};
 use stylet_report::pages::diagnosis::{recording_differences, summary_sentence};
 use stylet_report::significant;
 use stylet_scenario::Motion;
+use stylet_tissue::effect_info;
 
 pub const DIAGNOSIS: &str = "diagnosis";
 pub const EXTENDED: &str = "diagnosis/extended.ron";
@@ -83,17 +84,18 @@ impl Explained {
 fn diagnosis_view(d: &Diagnosis) -> Value {
     let number = |x: f64| significant(x, 4);
     let interval = |low: f64, high: f64| format!("{} to {}", number(low), number(high));
-    let causes =
-        d.causes.iter().map(|c| {
-            let mut lines = vec![format!("confidence {}", significant(c.confidence, 3))];
-            lines.extend(c.parameters.iter().map(|(path, e)| {
-                format!("{path} = {} (95 %: {})", number(e.value), interval(e.low, e.high))
-            }));
-            if !c.equivalent.is_empty() {
-                lines.push(format!("equivalent: {}", c.equivalent.join(", ")));
-            }
-            json!({ "id": c.effect, "title": title(&c.effect), "lines": lines })
-        });
+    let causes = d.causes.iter().map(|c| {
+        let mut lines = vec![format!("confidence {}", significant(c.confidence, 3))];
+        let info = |path: &str| effect_info(&c.effect)?.parameters.iter().find(|p| p.path == path);
+        lines.extend(c.parameters.iter().map(|(path, e)| {
+            let (name, unit) = info(path).map_or((path.as_str(), ""), |p| (p.meaning, p.unit));
+            format!("{name}: {} {unit} (95 %: {})", number(e.value), interval(e.low, e.high))
+        }));
+        if !c.equivalent.is_empty() {
+            lines.push(format!("equivalent: {}", c.equivalent.join(", ")));
+        }
+        json!({ "id": c.effect, "title": title(&c.effect), "lines": lines })
+    });
     let rows = d.base_parameters.iter().map(|p| {
         let whose = if p.layer == 0 { "tissue".to_owned() } else { format!("layer {}", p.layer) };
         let remark = match (p.at_bound, p.changed) {
@@ -101,7 +103,16 @@ fn diagnosis_view(d: &Diagnosis) -> Value {
             (_, true) => "changed",
             _ => "",
         };
-        json!([whose, p.name, number(p.assumed), number(p.value), interval(p.low, p.high), remark])
+        let (label, unit, factor) = named(&p.name);
+        let [assumed, value, low, high] = [p.assumed, p.value, p.low, p.high].map(|x| factor * x);
+        json!([
+            whose,
+            format!("{label} ({unit})"),
+            number(assumed),
+            number(value),
+            interval(low, high),
+            remark
+        ])
     });
     let g = &d.gain;
     let what = if g.held_out { "on held-out recordings" } else { "on the one recording, which was fitted" };

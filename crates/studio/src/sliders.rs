@@ -24,6 +24,16 @@ pub fn rounded(value: f64) -> f64 {
     significant(value, DIGITS).parse().unwrap_or(value)
 }
 
+/// Label, unit and factor of a scenario's number, such as `stiffness_n_per_m`; an unknown one keeps its name.
+pub fn named(number: &str) -> (&str, &'static str, f64) {
+    let field = number.split('_').next().unwrap_or_default();
+    match Scale::of_layer(field) {
+        Some(scale) => (scale.label, scale.unit, scale.factor),
+        None if number == "surface_m" => ("depth of the surface", "mm", 1e3),
+        None => (number, "", 1.0),
+    }
+}
+
 fn spread(low: f64, high: f64, log: bool) -> Vec<f64> {
     let at = |share: f64| match log && low > 0.0 {
         true => low * (high / low).powf(share),
