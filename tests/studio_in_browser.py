@@ -314,7 +314,7 @@ def move_rupture(page):
 
 # One movement of the pointer per frame for two seconds, as a mouse gives; Playwright's own mouse waits for the browser after each one.
 FRAME_RATE = """async () => {
-  const face = document.querySelectorAll('#view-phantom .face')[1], view = document.getElementById('view-phantom'), frames = () => Number(view.dataset.frames);
+  const face = document.querySelectorAll('#view-phantom .face')[1], view = document.getElementById('view-phantom'), frames = () => Number(view.dataset.frames || 0);
   Object.assign(face, { setPointerCapture() {}, releasePointerCapture() {}, hasPointerCapture: () => true });
   const x = face.getBoundingClientRect().left, send = (kind, dx) => face.dispatchEvent(new PointerEvent(kind, { clientX: x + dx, pointerId: 1, bubbles: true }));
   send('pointerdown', 0);

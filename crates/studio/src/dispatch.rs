@@ -30,7 +30,7 @@ impl Studio {
             }
             "look" => json(look::look(self, parse(body)?)?),
             "enhance" => json(look::write_enhancement(self, parse(body)?)?),
-            "preview" => json(preview(self, parse::<FileRequest>(body)?.file.as_deref())?),
+            "preview" => json(preview(self, parse::<FileRequest>(body)?.file.as_deref(), false)?),
             "edit" => json(self.edit(parse(body)?)?),
             "undo" => json(self.step_back(true)?),
             "redo" => json(self.step_back(false)?),
@@ -73,7 +73,7 @@ impl Studio {
         self.change(Snapshot { phantom: changed, ..self.now.clone() }, !same_stroke, !request.transient)?;
         self.stroke = stroke;
         Ok(EditView {
-            preview: preview(self, request.along.as_deref())?,
+            preview: preview(self, request.along.as_deref(), request.transient)?,
             phantom: view(&self.now.phantom)?,
             undo: self.undo.len(),
             redo: self.redo.len(),

@@ -189,7 +189,10 @@ pub fn without_causes(studio: &mut Studio, request: CausesRequest) -> Result<Cau
     let assumed_n = force_along_motion(&studio.now.phantom, &loaded.recording)?;
     let mut forces =
         vec![("measured", "measured", measured_n.as_slice()), ("assumed", "phantom", &assumed_n)];
-    let mut summary = format!("error of the phantom {}", rms_text(measured_n, &assumed_n));
+    let mut summary = format!(
+        "error with the ruptures where the model has them: phantom {}",
+        rms_text(measured_n, &assumed_n)
+    );
     let model_n = match &studio.explained.diagnosis {
         Some(diagnosed) => {
             let switched_off = |id: &str| {
@@ -204,7 +207,7 @@ pub fn without_causes(studio: &mut Studio, request: CausesRequest) -> Result<Cau
     if !model_n.is_empty() {
         forces.push(("extended", "diagnosed model", &model_n));
         summary += &format!(
-            ", of the diagnosed model with the causes that are switched on {}",
+            ", diagnosed model with the causes that are switched on {}",
             rms_text(measured_n, &model_n)
         );
     }

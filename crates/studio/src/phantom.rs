@@ -21,6 +21,9 @@ const SPEED_MPS: f64 = 2.5e-3;
 /// Depth below the last layer's start that is added to layers found in a recording, relative to the layer, and at least in m.
 const BEYOND: (f64, f64) = (0.2, 5e-3);
 
+/// Elastic force of the last layer at the deepest point, relative to the largest force, below which the tip has left the tissue.
+const MIN_FORCE_SHARE: f64 = 0.01;
+
 const MOTIONS: [(&str, &str); 3] = [
     ("constant", "one constant speed"),
     ("sinusoidal", "in and out, sinusoidal"),
@@ -180,7 +183,8 @@ fn layer(index: usize, thickness_m: f64, stiffness: f64, friction: f64, puncture
     }
 }
 
-/// Layers from the online algorithm's estimates: faces where ruptures were located, the last layer to below the deepest point.
+/// Layers from the online algorithm's estimates: faces where ruptures were located, the last layer to below the deepest point unless the tip
+/// has left the tissue.
 fn from_recording(
     studio: &mut Studio,
     file: &str,
@@ -215,7 +219,10 @@ fn from_recording(
     let end_m = recording.position_m[deepest];
     let beyond_m = (BEYOND.0 * (end_m - surface_m)).max(BEYOND.1);
     let [stiffness, friction] = [&trace.stiffness_n_per_m, &trace.friction].map(|c| last(c).unwrap_or(0.0));
-    layers.push(layer(layers.len(), end_m + beyond_m - front_m, stiffness, friction, None));
+    let peak_n = recording.force_n.iter().copied().fold(0.0, f64::max);
+    if layers.is_empty() || stiffness * (end_m - front_m) > MIN_FORCE_SHARE * peak_n {
+        layers.push(layer(layers.len(), end_m + beyond_m - front_m, stiffness, friction, None));
+    }
     let start_m = recording.position_m.first().copied().unwrap_or(0.0);
     let duration_s = recording.time_s[deepest] - recording.time_s[0];
     let speed_mps = if duration_s > 0.0 { rounded((end_m - start_m) / duration_s) } else { SPEED_MPS };

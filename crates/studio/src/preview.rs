@@ -9,18 +9,21 @@ use stylet_report::{kept_indices, pick};
 use stylet_scenario::{ForceTorque, Robot, Sensor};
 use stylet_tissue::{ForceLaw, Rupture, replay};
 
-/// Samples that are simulated of the phantom's own motion at most.
-const MAX_SIMULATED: f64 = 20_000.0;
+/// Samples that are simulated at most of the phantom's own motion, and of a recorded one while the mouse moves.
+const MAX_SIMULATED: usize = 20_000;
 /// Points of a curve that is redrawn while the mouse moves.
 const MAX_POINTS: usize = 1600;
 
-/// The force of the phantom along its own motion, or along a recording.
-pub fn preview(studio: &mut Studio, along: Option<&str>) -> Result<PreviewView, Problem> {
+/// The force of the phantom along its own motion, or along a recording. While the mouse moves, `transient`, long recordings are thinned.
+pub fn preview(studio: &mut Studio, along: Option<&str>, transient: bool) -> Result<PreviewView, Problem> {
     let scenario = studio.now.phantom.clone();
     match along {
         Some(file) => {
             let loaded = studio.recording(file)?;
-            along_recording(&scenario, &loaded.recording, file)
+            match transient && loaded.recording.len() > MAX_SIMULATED {
+                true => along_recording(&scenario, &thinned(&loaded.recording), file),
+                false => along_recording(&scenario, &loaded.recording, file),
+            }
         }
         None => along_own_motion(scenario),
     }
@@ -34,7 +37,7 @@ fn along_own_motion(mut scenario: Scenario) -> Result<PreviewView, Problem> {
     scenario.robot = Robot::Replay;
     let sensor = scenario.sensor.force_torque().cloned().unwrap_or_default();
     scenario.sensor = Sensor::ForceTorque(ForceTorque { noise_n: 0.0, ..sensor });
-    scenario.sample_hz = scenario.sample_hz.min(MAX_SIMULATED / plan.duration_s().max(1e-3));
+    scenario.sample_hz = scenario.sample_hz.min(MAX_SIMULATED as f64 / plan.duration_s().max(1e-3));
     scenario.physics_hz = scenario.sample_hz;
     let found = stylet_testbed::simulate(&scenario, scenario.seed)?;
     let forces = [
@@ -49,6 +52,19 @@ fn along_own_motion(mut scenario: Scenario) -> Result<PreviewView, Problem> {
         curves: curves(&found.recording, &forces, MAX_POINTS),
         ruptures,
     })
+}
+
+/// Every so many samples of a long recording.
+fn thinned(recording: &Recording) -> Recording {
+    let step = recording.len().div_ceil(MAX_SIMULATED);
+    let part = |column: &[f64]| column.iter().step_by(step).copied().collect();
+    Recording {
+        time_s: part(&recording.time_s),
+        position_m: part(&recording.position_m),
+        velocity_mps: part(&recording.velocity_mps),
+        force_n: part(&recording.force_n),
+        ..Recording::default()
+    }
 }
 
 fn along_recording(scenario: &Scenario, recording: &Recording, file: &str) -> Result<PreviewView, Problem> {
