@@ -82,6 +82,7 @@ export class ExplainView {
     const running = job.state === "running", names = { diagnose: "Diagnosis", plan: "Plan", predict: "Prediction" };
     fill(this.job, h("h2", {}, `${names[job.kind]}: ${job.state}, ${Math.round(job.elapsed_s)} s`),
       running && h("progress", { "aria-label": "in progress" }),
+      running && h("p", { class: "soft" }, "Seconds to a few minutes; the other views can be used meanwhile."),
       h("ol", { class: "stages" }, job.stages.slice(-6).map(stage => h("li", {}, stage))),
       job.error && h("p", { class: "bad" }, job.error),
       running && button("Cancel", () => this.app.attempt(async () => { this.app.state.job = await call("cancel"); this.paintJob(this.app.state.job); })));

@@ -38,28 +38,21 @@ fn inputs(studio: &mut Studio, files: &[String]) -> Result<DiagnosisInputs, Prob
     })
 }
 
-fn begun(studio: &mut Studio, job: Job) -> Value {
+/// Starts a job; what the page shows of it.
+fn launch(
+    studio: &mut Studio,
+    kind: &'static str,
+    work: impl FnOnce(&dyn Fn(&str)) -> Result<JobResult, Problem> + Send + 'static,
+) -> Result<Value, Problem> {
+    let job = Job::start(kind, work)?;
     let view = job.view();
     studio.job = Some(job);
-    view
+    Ok(view)
 }
 
 /// Takes the result of a job into the state.
-pub fn collect(studio: &mut Studio, result: JobResult) {
-    let command = match result {
-        JobResult::Diagnosed(diagnosed, command) => {
-            studio.explained = Explained { diagnosis: Some(*diagnosed), ..Explained::default() };
-            command
-        }
-        JobResult::Planned(planned, command) => {
-            studio.explained.plan = Some(*planned);
-            command
-        }
-        JobResult::Predicted(predicted, command) => {
-            studio.explained.prediction = Some(predicted);
-            command
-        }
-    };
+pub fn collect(studio: &mut Studio, (command, update): JobResult) {
+    update(&mut studio.explained);
     // The results are complete; a journal that cannot be written fails the next change, too.
     let _ = studio.workspace.record(command);
 }
@@ -70,7 +63,7 @@ pub fn start_diagnosis(studio: &mut Studio, request: FilesRequest) -> Result<Val
     }
     let inputs = inputs(studio, &request.files)?;
     let folder = studio.workspace.path(DIAGNOSIS);
-    let job = Job::start("diagnose", move |stage| {
+    launch(studio, "diagnose", move |stage| {
         stage("reading the recordings");
         let assumed = Scenario::load(&inputs.scenario)?;
         let recordings = inputs.read_recordings()?;
@@ -78,10 +71,12 @@ pub fn start_diagnosis(studio: &mut Studio, request: FilesRequest) -> Result<Val
         let output = found.output(&assumed, &inputs)?;
         stage("writing the results");
         output.write(&folder)?;
-        let command = commands::diagnose(&inputs, &folder, &output);
-        Ok(JobResult::Diagnosed(Box::new(Diagnosed::new(&found.diagnosis, found.extended)), command))
-    })?;
-    Ok(begun(studio, job))
+        let diagnosed = Diagnosed::new(&found.diagnosis, found.extended);
+        // Plan and prediction were those of the diagnosis before.
+        let update =
+            |now: &mut Explained| *now = Explained { diagnosis: Some(diagnosed), ..Explained::default() };
+        Ok((commands::diagnose(&inputs, &folder, &output), Box::new(update)))
+    })
 }
 
 pub fn start_plan(studio: &mut Studio, request: PlanRequest) -> Result<Value, Problem> {
@@ -99,15 +94,15 @@ pub fn start_plan(studio: &mut Studio, request: PlanRequest) -> Result<Value, Pr
     studio.workspace.write(LIMITS, format!("Limits{ron}\n").as_bytes())?;
     let limits_file = studio.workspace.path(LIMITS);
     let motion_file = studio.workspace.path("plan/plan.ron");
-    let job = Job::start("plan", move |stage| {
+    launch(studio, "plan", move |stage| {
         let limits = plan_insertion::load_limits(&limits_file)?;
         let report = plan_insertion::plan(&inputs, (&limits_file, &limits), false, stage)?;
         stage("writing the plan");
         report.write(&motion_file)?;
         let planned = Planned { view: plan_view(&report), motion: report.plan.motion.clone() };
-        Ok(JobResult::Planned(Box::new(planned), commands::plan(&inputs, &limits_file, &motion_file)))
-    })?;
-    Ok(begun(studio, job))
+        let update = |now: &mut Explained| now.plan = Some(planned);
+        Ok((commands::plan(&inputs, &limits_file, &motion_file), Box::new(update)))
+    })
 }
 
 fn whole_percent(share: f64) -> String {
@@ -156,7 +151,7 @@ pub fn start_prediction(studio: &mut Studio, request: FilesRequest) -> Result<Va
         None => inputs.scenario.clone(),
     };
     let folder = studio.workspace.path(PREDICTION);
-    let job = Job::start("predict", move |stage| {
+    launch(studio, "predict", move |stage| {
         stage("reading the recordings");
         let scenario = Scenario::load(&model)?;
         let ModelOrigin { diagnosis, assumed } = ModelOrigin::of_model_file(&model, None)?;
@@ -177,9 +172,9 @@ pub fn start_prediction(studio: &mut Studio, request: FilesRequest) -> Result<Va
             "rows": rows.collect::<Value>(),
             "folder": PREDICTION,
         });
-        Ok(JobResult::Predicted(view, commands::predict(&model, &inputs, &folder, &output)))
-    })?;
-    Ok(begun(studio, job))
+        let update = |now: &mut Explained| now.prediction = Some(view);
+        Ok((commands::predict(&model, &inputs, &folder, &output), Box::new(update)))
+    })
 }
 
 /// Measured force, that of the phantom, and, after a diagnosis, that of its model with some of the causes.

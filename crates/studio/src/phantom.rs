@@ -241,7 +241,8 @@ fn from_recording(
 /// Writes phantom and map.
 pub fn save(studio: &mut Studio) -> Result<Value, Problem> {
     studio.keep()?;
-    studio.workspace.record(commands::open_again(&studio.folder().to_owned()))?;
+    let command = commands::open_again(studio.folder());
+    studio.workspace.record(command)?;
     studio.state()
 }
 

@@ -42,12 +42,8 @@ pub struct Planned {
     pub motion: Motion,
 }
 
-/// What a job gives.
-pub enum JobResult {
-    Diagnosed(Box<Diagnosed>, CommandView),
-    Planned(Box<Planned>, CommandView),
-    Predicted(Value, CommandView),
-}
+/// What a job gives: the command that repeats it, and the change of the results.
+pub type JobResult = (CommandView, Box<dyn FnOnce(&mut Explained) + Send>);
 
 /// The results in the workspace.
 #[derive(Default)]

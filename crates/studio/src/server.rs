@@ -9,12 +9,12 @@ use crate::messages::Problem;
 use crate::page;
 use crate::studio::Studio;
 use axum::Router;
-use axum::body::{Body, to_bytes};
+use axum::body::{Body, HttpBody as _, to_bytes};
 use axum::extract::{Path, State};
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::StatusCode;
 use axum::response::Response;
 use axum::routing::{get, post};
-use http_body_util::BodyExt as _;
+use http_body_util::{BodyExt as _, LengthLimitError, Limited};
 use std::io::{self, Write as _};
 use std::net::{Ipv4Addr, TcpListener};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -31,7 +31,7 @@ const BODY_TIMEOUT: Duration = Duration::from_secs(10);
 /// Longest message in bytes.
 const MAX_MESSAGE_BYTES: usize = 1 << 20;
 /// Largest recording in bytes: 10 million samples as CSV.
-const MAX_UPLOAD_BYTES: u64 = 512 << 20;
+const MAX_UPLOAD_BYTES: usize = 512 << 20;
 /// Bytes of randomness in the address.
 const TOKEN_BYTES: usize = 16;
 /// A result file may run its own scripts without access to anything, the page included.
@@ -147,12 +147,10 @@ async fn with_studio<T: Send + 'static>(
 async fn upload(
     State(shared): State<Arc<Shared>>,
     Path((_, name)): Path<(String, String)>,
-    headers: HeaderMap,
-    mut body: Body,
+    body: Body,
 ) -> Response {
     const TOO_LARGE: &str = "a recording has at most 512 MB; cut it to the insertion";
-    let announced = headers.get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse::<u64>().ok());
-    if announced.is_some_and(|bytes| bytes > MAX_UPLOAD_BYTES) {
+    if body.size_hint().lower() > MAX_UPLOAD_BYTES as u64 {
         return plain(StatusCode::PAYLOAD_TOO_LARGE, TOO_LARGE);
     }
     let failed = |why: io::Error| json(Err(Problem::new(format!("the upload cannot be stored: {why}"))));
@@ -160,20 +158,18 @@ async fn upload(
         Ok(file) => file,
         Err(why) => return failed(why),
     };
-    let mut bytes = 0;
+    let mut body = Limited::new(body, MAX_UPLOAD_BYTES);
     loop {
         let frame = match timeout(BODY_TIMEOUT, body.frame()).await {
             Ok(None) => break,
             Ok(Some(Ok(frame))) => frame,
+            Ok(Some(Err(why))) if why.is::<LengthLimitError>() => {
+                return plain(StatusCode::PAYLOAD_TOO_LARGE, TOO_LARGE);
+            }
             Ok(Some(Err(_))) => return plain(StatusCode::BAD_REQUEST, "the upload ended early"),
             Err(_) => return plain(StatusCode::REQUEST_TIMEOUT, "the upload stopped"),
         };
-        let Ok(data) = frame.into_data() else { continue };
-        bytes += data.len() as u64;
-        if bytes > MAX_UPLOAD_BYTES {
-            return plain(StatusCode::PAYLOAD_TOO_LARGE, TOO_LARGE);
-        }
-        if let Err(why) = received.write_all(&data) {
+        if let Some(Err(why)) = frame.data_ref().map(|data| received.write_all(data)) {
             return failed(why);
         }
     }
