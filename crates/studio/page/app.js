@@ -23,24 +23,33 @@ export const app = {
     }
   },
 
-  alert(message, level = "bad") {
-    const box = h("div", { class: `alert ${level}` }, h("span", {}, message), button("Close", () => box.remove(), { class: "quiet" }));
+  // `report`: a result page that the message is about.
+  alert(message, level = "bad", report = null) {
+    const box = h("div", { class: `alert ${level}` }, h("span", {}, message),
+      report && h("a", { href: `file/${report}`, target: "_blank", rel: "noopener" }, "Open the report"), button("Close", () => box.remove(), { class: "quiet" }));
     by("alerts").append(box);
     if (by("alerts").childElementCount > 3) by("alerts").firstChild.remove();
-    if (level === "good") setTimeout(() => box.remove(), 6000);
+    if (level === "good") setTimeout(() => box.remove(), report ? 15000 : 6000);
   },
 
   async refresh(state) {
-    this.state = state || await call("state");
+    this.adopt(state || await call("state"));
+    await this.views[this.view]?.update();
+  },
+
+  // Shows a state outside the view.
+  adopt(state) {
+    this.state = state;
     if (!this.state.files.includes(this.file)) this.file = this.state.files[0] || null;
     by("folder").textContent = `workspace ${this.state.folder}`;
     by("undo").disabled = !this.state.undo;
     by("redo").disabled = !this.state.redo;
     drawer.update();
-    await this.views[this.view]?.update();
   },
 
-  async show(name) {
+  // Changes the view, with a new state if one is given.
+  async show(name, state = null) {
+    if (state) this.adopt(state);
     this.view = name;
     for (const tab of document.querySelectorAll("[role=tab]")) {
       const chosen = tab.dataset.view === name;
@@ -65,16 +74,11 @@ export const app = {
       const found = await this.attempt(() => upload(file));
       if (found) { last = found; this.views.open.remember(found); }
     }
-    if (phantom && !last) {
-      this.state = await call("state");
-      await this.show("phantom");
-      await this.refresh(this.state);
-    }
+    if (phantom && !last) await this.show("phantom", await call("state"));
     if (!last) return;
     this.file = last.file;
-    this.state = await call("state");
-    await this.show(last.readable && !last.findings.some(f => f.level === "bad") ? "look" : "open");
-    await this.refresh(this.state);
+    const state = await call("state");
+    await this.show(last.readable && !last.findings.some(f => f.level === "bad") ? "look" : "open", state);
   },
 };
 
@@ -147,11 +151,9 @@ async function start() {
   try { kept = localStorage.getItem("theme"); } catch { /* as above */ }
   theme(["auto", "light", "dark"].includes(kept) ? kept : "auto");
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
-  [app.library, app.state] = await Promise.all([call("library"), call("state")]);
-  const asked = location.hash.slice(1);
-  app.file = app.state.files[0] || null;
-  await app.show(app.views[asked] ? asked : app.state.diagnosis ? "explain" : app.state.files.length ? "look" : "phantom");
-  await app.refresh(app.state);
+  const [library, state] = await Promise.all([call("library"), call("state")]), asked = location.hash.slice(1);
+  app.library = library;
+  await app.show(app.views[asked] ? asked : state.diagnosis ? "explain" : state.files.length ? "look" : "phantom", state);
   document.documentElement.dataset.ready = "true";
 }
 

@@ -107,9 +107,7 @@ export class ExplainView {
         button("Keep this model as the phantom", () => app.attempt(async () => {
           await call("edit", { edit: { kind: "from_diagnosis" } });
           app.views.phantom.along = app.file;
-          app.state = await call("state");
-          await app.show("phantom");
-          await app.refresh(app.state);
+          await app.show("phantom", await call("state"));
         }), { class: "primary" }),
         h("span", { class: "soft" }, "extended.ron is in the workspace, in diagnosis/")));
     if (this.shown === found.folder + found.sentence + found.gain) return;
@@ -155,9 +153,7 @@ export class ExplainView {
           h("div", { class: "row" }, button("See it on the phantom", () => this.app.attempt(async () => {
             this.app.views.phantom.along = null;
             await call("edit", { edit: { kind: "from_plan" } });
-            this.app.state = await call("state");
-            await this.app.show("phantom");
-            await this.app.refresh(this.app.state);
+            await this.app.show("phantom", await call("state"));
           }))), this.frame("Plan", `${plan.folder}/plan.html`))),
       h("section", { class: "card" }, h("h2", {}, "Does it predict the next recording?"),
         h("p", { class: "soft" }, `Drop the recording of the next insertion${state.files.length > 0 ? ", then choose it" : ""}.`), state.files.length > 0 && further,

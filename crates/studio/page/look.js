@@ -140,13 +140,11 @@ export class LookView {
           button("Start a phantom from these layers →", () => app.attempt(async () => {
             await call("edit", { edit: { kind: "from_recording", file, algorithm: run.algorithm, corrections: this.corrections() } });
             app.views.phantom.along = file;
-            app.state = await call("state");
-            await app.show("phantom");
-            await app.refresh(app.state);
+            await app.show("phantom", await call("state"));
           }), { class: "primary", disabled: !run.contact }),
           button("Write results", () => app.attempt(async () => {
             const written = await call("enhance", { file, algorithms: [run.algorithm], corrections: this.corrections() });
-            app.alert(written.summary, "good");
+            app.alert(written.summary, "good", `${written.folder}/report.html`);
             await app.refresh();
           }))))),
       found.runs.length === 0 && h("p", { class: "soft" }, "Choose an algorithm."));

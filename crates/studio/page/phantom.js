@@ -171,7 +171,7 @@ export class PhantomView {
   simulate() {
     return this.app.attempt(async () => {
       const done = await call("run");
-      this.app.alert(`${done.summary}; report, recording and score are in ${done.folder}/`, "good");
+      this.app.alert(`${done.summary}; report, recording and score are in ${done.folder}/`, "good", `${done.folder}/report.html`);
       await this.app.refresh();
     });
   }

@@ -2,7 +2,6 @@
 
 use crate::commands;
 use crate::messages::*;
-use crate::phantom::MIN_THICKNESS_M;
 use crate::phantom_view::millimetres;
 use crate::preview::curves;
 use crate::studio::Studio;
@@ -15,6 +14,8 @@ use stylet_core::{Detection, LayerEstimate};
 use stylet_record::QualityNote;
 use stylet_report::{plus_minus, significant};
 
+/// Thinnest layer that a dragged face or rupture leaves, in m.
+pub const MIN_THICKNESS_M: f64 = 5e-4;
 /// Points of a curve.
 const MAX_POINTS: usize = 6000;
 /// Ruptures and layers that are listed.

@@ -1,5 +1,6 @@
 //! The phantom: a scenario that is edited with the mouse.
 
+use crate::look::MIN_THICKNESS_M;
 use crate::messages::*;
 use crate::phantom_view::{SCENARIOS, first, parse, title, tolerance};
 use crate::sliders::{Scale, rounded};
@@ -12,8 +13,6 @@ use stylet_tissue::{
     AnyEffect, Effect as _, EffectInfo, Layer, effect_info, general_effects, per_layer_effects,
 };
 
-/// Thinnest layer that a dragged face leaves, in m.
-pub const MIN_THICKNESS_M: f64 = 5e-4;
 /// Distance from the surface at which the library's motions begin, in m.
 const APPROACH_M: f64 = 5e-3;
 /// Speed of the library's motions, in m/s.
