@@ -178,7 +178,9 @@ async fn guard(State(access): State<Arc<Access>>, request: Request, next: Next) 
 fn refusal(access: &Access, headers: &HeaderMap, path: &str) -> Option<(StatusCode, &'static str)> {
     let values = |name| headers.get_all(name).iter().map(|value| value.to_str().unwrap_or_default());
     let own = |host: &str| (access.own_host)(host);
-    if !values(header::HOST).all(own) {
+    // Without a token, clients of HTTP/1.0 may read.
+    let unnamed = access.token.is_some() && !headers.contains_key(header::HOST);
+    if unnamed || !values(header::HOST).all(own) {
         return Some((StatusCode::MISDIRECTED_REQUEST, "wrong Host: open the address that stylet printed"));
     }
     if !values(header::ORIGIN).all(|origin| origin.strip_prefix("http://").is_some_and(own)) {

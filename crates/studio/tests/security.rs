@@ -89,6 +89,7 @@ fn a_foreign_host_origin_or_token_is_refused() {
         // A name of an attacker that resolves to this computer.
         (page.as_str(), &format!("Host: evil.example:{port}")),
         (page.as_str(), "Host: 127.0.0.1:1"),
+        (page.as_str(), "Host:"),
         (page.as_str(), "Origin: http://evil.example"),
         (page.as_str(), "Origin: null"),
         (page.as_str(), &format!("Origin: https://{}", running.host)),
@@ -103,6 +104,11 @@ fn a_foreign_host_origin_or_token_is_refused() {
         assert_eq!(status, expected, "{head} {header}");
         assert!(!answer.contains("phantom") && !answer.contains(&running.base), "{head} {header}: {answer}");
     }
+    let mut unnamed = TcpStream::connect(&running.host).expect("a connection");
+    write!(unnamed, "{page} HTTP/1.0\r\n\r\n").expect("sent");
+    let mut answer = String::new();
+    let _ = unnamed.read_to_string(&mut answer);
+    assert!(answer.contains(" 421 "), "without Host: {answer}");
     let own = format!("Origin: http://{}", running.host);
     assert_eq!(running.send(&format!("POST {}/api/state", running.base), &[&own], b"{}").0, 200);
 }
