@@ -3,7 +3,7 @@
 use crate::commands;
 use crate::messages::*;
 use crate::phantom_view::millimetres;
-use crate::preview::curves;
+use crate::preview::{curves, selected};
 use crate::studio::Studio;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -95,14 +95,9 @@ pub fn look(studio: &mut Studio, request: LookRequest) -> Result<LookView, Probl
     }
     let shown = window(recording, request.window_s);
     let part = |column: &[f64]| column.get(shown.clone()).unwrap_or_default().to_vec();
-    let visible = Recording {
-        time_s: part(&recording.time_s),
-        position_m: part(&recording.position_m),
-        velocity_mps: part(&recording.velocity_mps),
-        ..Recording::default()
-    };
+    let mut visible = selected(recording, part);
     let mut columns: Vec<(&'static str, &str, Vec<f64>)> =
-        vec![("measured", "measured", part(&recording.force_n))];
+        vec![("measured", "measured", std::mem::take(&mut visible.force_n))];
     for (algorithm, run) in &runs {
         columns.push(("enhanced", algorithm, part(&run.trace.enhanced_n)));
         if run.trace.low_n.iter().any(|v| v.is_finite()) {

@@ -20,10 +20,10 @@ pub fn preview(studio: &mut Studio, along: Option<&str>, transient: bool) -> Res
     match along {
         Some(file) => {
             let loaded = studio.recording(file)?;
-            match transient && loaded.recording.len() > MAX_SIMULATED {
-                true => along_recording(&scenario, &thinned(&loaded.recording), file),
-                false => along_recording(&scenario, &loaded.recording, file),
-            }
+            let step = if transient { loaded.recording.len().div_ceil(MAX_SIMULATED) } else { 1 };
+            let thinned =
+                selected(&loaded.recording, |column| column.iter().step_by(step.max(1)).copied().collect());
+            along_recording(&scenario, &thinned, file)
         }
         None => along_own_motion(scenario),
     }
@@ -54,10 +54,8 @@ fn along_own_motion(mut scenario: Scenario) -> Result<PreviewView, Problem> {
     })
 }
 
-/// Every so many samples of a long recording.
-fn thinned(recording: &Recording) -> Recording {
-    let step = recording.len().div_ceil(MAX_SIMULATED);
-    let part = |column: &[f64]| column.iter().step_by(step).copied().collect();
+/// Some of the samples: `part` selects them from a column.
+pub fn selected(recording: &Recording, part: impl Fn(&[f64]) -> Vec<f64>) -> Recording {
     Recording {
         time_s: part(&recording.time_s),
         position_m: part(&recording.position_m),
