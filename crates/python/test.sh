@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Tests the Python package: type stubs, pytest, notebooks, in an environment of its own (cached in target/python). Uses the
-# profile and the target folder of `cargo test`, so that little is compiled twice; `--release` for speeds worth reading; what
-# STYLET_BUILD holds goes to cargo, and STYLET_COMMAND names a command that is built already (`.ci/run` has both). Ends with 77 where there is no Python
+# profile and the target folder of `cargo test`, so that little is compiled twice; `--release` for speeds worth reading.
+# STYLET_BUILD names packages and features for cargo, which should be those of the tests, and STYLET_COMMAND a command that is
+# built already (`.ci/run` has both). Ends with 77 where there is no Python
 # to test with or its packages cannot be had.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
@@ -27,15 +28,15 @@ if ! cmp -s crates/python/requirements-test.txt "$stamp"; then
 fi
 export MPLBACKEND=agg PYTHONPATH="$target/python-module"
 profile=debug
-read -ra build <<<"${STYLET_BUILD:-}"
+read -ra build <<<"${STYLET_BUILD:--p stylet -p stylet-python --features stylet-python/extension-module}"
 [ "${1:-}" = --release ] && { profile=release; build+=(--release); shift; }
 # Built together with the command, with which the tests compare it, so that both share every dependency; maturin would choose other
 # features for them.
 if [ -z "${STYLET_COMMAND:-}" ]; then
-    cargo build "${build[@]}" -p stylet
+    cargo build "${build[@]}"
     export STYLET_COMMAND="$target/$profile/stylet"
 fi
-PYO3_PYTHON="$venv/bin/python" cargo build "${build[@]}" -p stylet -p stylet-python --lib --features stylet-python/extension-module
+PYO3_PYTHON="$venv/bin/python" cargo build "${build[@]}" --lib
 rm -rf "$target/python-module"
 mkdir -p "$target/python-module"
 cp -r crates/python/python/stylet "$target/python-module/stylet"

@@ -18,10 +18,16 @@ use stylet_scenario::Scenario;
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
+    let Some(file) = &args.scenario else {
+        if args.repeats {
+            return Err(Failure::Check("--repeats needs a scenario or a data set".to_owned()));
+        }
+        return crate::cli::identify::diagnose(args);
+    };
     // The scenario may be the result of an interrupted diagnosis.
-    recover_parent(&args.scenario)?;
-    if args.repeats || stylet_diagnose::repeated_insertions::dataset::is_dataset(&args.scenario)? {
-        return crate::cli::diagnose_repeats::diagnose(args);
+    recover_parent(file)?;
+    if args.repeats || stylet_diagnose::repeated_insertions::dataset::is_dataset(file)? {
+        return crate::cli::diagnose_repeats::diagnose(args, file);
     }
     if args.data.is_empty() {
         return Err(Failure::Check(
@@ -29,29 +35,30 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
                 .to_owned(),
         ));
     }
-    let scenario = Scenario::load(&args.scenario)?;
+    let scenario = Scenario::load(file)?;
     args.limits.check(
-        &args.scenario,
+        file,
         &resource_estimate::estimate_diagnose(&args.data),
         args.results.quiet,
     )?;
-    let inputs = args.inputs();
-    let folder = args.results.output_folder(&args.scenario, "-diagnosis");
-    let read = args.results.inputs(&args.scenario, args.data.iter().chain(&args.columns));
+    let inputs = args.inputs(file);
+    let folder = args.results.output_folder(file, "-diagnosis");
+    let read = args.results.inputs(file, args.data.iter().chain(&args.columns));
     check_folder(&folder, "diagnosis.json", &read)?;
     let progress = stage_printer(args.results.quiet, " ...");
     let recordings = inputs.read_recordings()?;
     let samples: Vec<f64> = recordings.iter().map(|r| r.recording.len() as f64).collect();
     let estimate = resource_estimate::estimate_diagnose_samples(&samples);
-    args.limits.check(&args.scenario, &estimate, true)?;
-    let limit = args.limits.start_time_limit(&args.scenario);
+    args.limits.check(file, &estimate, true)?;
+    let limit = args.limits.start_time_limit(file);
     let found = stylet_api::diagnose(&scenario, &recordings, progress)?;
     drop(limit);
     let output = found.output(&scenario, &inputs)?.with_inputs(read);
     args.results.write_and_print(&folder, &output, || summary(&found.diagnosis))
 }
 
-fn summary(d: &Diagnosis) -> String {
+/// Verdict, causes, errors and findings in words.
+pub(super) fn summary(d: &Diagnosis) -> String {
     let mut out = String::new();
     let _ = writeln!(out, "{}", summary_sentence(d));
     for c in &d.causes {

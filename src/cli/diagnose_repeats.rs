@@ -4,6 +4,7 @@ use crate::cli::args::DiagnoseArgs;
 use crate::cli::exit_codes::Failure;
 use crate::cli::terminal_output::stage_printer;
 use std::fmt::Write as _;
+use std::path::Path;
 use stylet_api::diagnose_repeats::{diagnose_repeats, load_data_set, recording_files};
 use stylet_api::diagnose_specimens::{SpecimensReport, diagnose_specimens};
 use stylet_api::output_folder::check_folder;
@@ -18,8 +19,8 @@ use stylet_report::significant;
 ///
 /// # Errors
 /// [`Failure`] with the exit code that fits.
-pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
-    let (inputs, results) = (args.inputs(), &args.results);
+pub fn diagnose(args: &DiagnoseArgs, file: &Path) -> Result<(), Failure> {
+    let (inputs, results) = (args.inputs(file), &args.results);
     let set = load_data_set(&inputs)?;
     let files = recording_files(&set, &args.data)?;
     let estimate = if set.split_by.is_empty() {
@@ -27,11 +28,11 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     } else {
         resource_estimate::estimate_diagnose(&files)
     };
-    args.limits.check(&args.scenario, &estimate, results.quiet)?;
-    let folder = results.output_folder(&args.scenario, "-diagnosis");
-    let read = results.inputs(&args.scenario, files.iter().chain(&args.columns));
+    args.limits.check(file, &estimate, results.quiet)?;
+    let folder = results.output_folder(file, "-diagnosis");
+    let read = results.inputs(file, files.iter().chain(&args.columns));
     check_folder(&folder, "diagnosis.json", &read)?;
-    let limit = args.limits.start_time_limit(&args.scenario);
+    let limit = args.limits.start_time_limit(file);
     let runs = set.load_recordings(&files, set.tissue.layers.len())?;
     if !set.split_by.is_empty() {
         let found = diagnose_specimens(&set, &runs)?;

@@ -9,6 +9,7 @@ mod diagnose_repeats;
 mod effects;
 mod enhance;
 mod exit_codes;
+mod identify;
 mod inspect;
 mod listen;
 mod output_args;
@@ -56,6 +57,7 @@ fn memory_limit(command: &Command) -> f64 {
         Command::Run(args) => args.limits,
         Command::Enhance(args) => args.limits,
         Command::Diagnose(args) => args.limits,
+        Command::Identify(args) => args.limits,
         Command::Predict(args) => args.limits,
         Command::Identifiability(args) => args.resources,
         Command::Plan(args) => args.resources,
@@ -80,6 +82,7 @@ pub fn main() -> ExitCode {
         Command::Gate(args) => sweep::gate(args),
         Command::Compare(args) => compare::compare(args),
         Command::Diagnose(args) => diagnose::diagnose(args),
+        Command::Identify(args) => identify::identify(args),
         Command::Predict(args) => predict::predict(args),
         Command::Identifiability(args) => plan::identifiability(args),
         Command::Plan(args) => plan::plan(args),

@@ -90,6 +90,28 @@ pub fn diagnose(
     })
 }
 
+/// Finds the layers that recordings show, `layers` of them or as many as there are, and diagnoses what is left: the scenario that it
+/// started from, and the diagnosis.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn identify(
+    name: &str,
+    recordings: &[NamedRecording],
+    layers: Option<usize>,
+    mut progress: impl FnMut(&str),
+) -> Result<(Scenario, DiagnosisReport), Error> {
+    progress("looking for layers");
+    let usable = usable_recordings(recordings)?;
+    let scenario = stylet_diagnose::scenario_from_recordings(name, &usable, layers)?;
+    let mut report = diagnose(&scenario, recordings, progress)?;
+    // The numbers are known now.
+    let usual = Scenario::new(String::new(), scenario.tissue.clone(), scenario.motion.clone());
+    report.extended.tolerance = usual.tolerance;
+    report.extended.thickness_tolerance = usual.thickness_tolerance;
+    Ok((scenario, report))
+}
+
 /// Predicts held-out recordings by a model. Noise, scatter and intervals come from the `diagnosis` that gave the model; `assumed` is the
 /// scenario before that diagnosis, for comparison. The parameters in `refit` are fitted to the recordings first; of two or more recordings
 /// each is predicted by the values from the others.

@@ -157,7 +157,7 @@ impl Error {
     }
 
     /// A bug of Stylet, from its description.
-    pub(crate) fn internal(error: impl std::fmt::Display) -> Self {
+    pub fn internal(error: impl std::fmt::Display) -> Self {
         Self::Internal(error.to_string())
     }
 }

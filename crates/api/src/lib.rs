@@ -38,7 +38,7 @@ mod simulate;
 pub mod sweep;
 pub mod sweep_folder;
 
-pub use diagnose::{DiagnosisReport, diagnose, predict_recordings};
+pub use diagnose::{DiagnosisReport, diagnose, identify, predict_recordings};
 pub use diagnosis_inputs::{DiagnosisInputs, INPUTS_FILE, read_options, read_recordings, recording_name};
 pub use enhancement::{IdentifiedModel, enhance, enhance_as, enhance_with_model};
 pub use error::Error;

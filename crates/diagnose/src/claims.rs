@@ -6,6 +6,7 @@
 
 use crate::diagnosis_json::{BaseParameter, Diagnosis, Finding, FindingKind, Gain, Verdict};
 use stylet_record::{QualityKind, Recording};
+use stylet_scenario::Scenario;
 use stylet_stats::number_format::{p_value, significant};
 
 /// Predictions that miss by more than this factor above the noise, with the scatter between recordings known, contradict the
@@ -45,6 +46,9 @@ pub(crate) struct Context {
 /// Adds the findings to a diagnosis, and sets agreement, verdict and confidences accordingly.
 pub(crate) fn apply(d: &mut Diagnosis, context: &Context) {
     d.findings = findings(d, context);
+    if d.verdict == Verdict::None && d.base_parameters.iter().any(|b| b.out_of_tolerance) {
+        d.verdict = Verdict::Parameters;
+    }
     let contradicted = d.findings.iter().any(|f| contradicts(f.kind));
     d.agrees = d.verdict == Verdict::None && !contradicted;
     let most = max_confidence(&d.findings);
@@ -56,14 +60,14 @@ pub(crate) fn apply(d: &mut Diagnosis, context: &Context) {
 /// Whether a finding contradicts agreement.
 #[must_use]
 pub fn contradicts(kind: FindingKind) -> bool {
-    !matches!(kind, FindingKind::OneRecording | FindingKind::OneMotion)
+    !matches!(kind, FindingKind::OneRecording | FindingKind::OneMotion | FindingKind::OutOfTolerance)
 }
 
 /// Largest confidence that these findings allow.
 fn max_confidence(findings: &[Finding]) -> f64 {
     let most = |f: &Finding| match f.kind {
         FindingKind::OneRecording | FindingKind::OneMotion => MAX_CONFIDENCE_FEW,
-        FindingKind::OutlierRecording => 1.0,
+        FindingKind::OutlierRecording | FindingKind::OutOfTolerance => 1.0,
         _ => MAX_CONFIDENCE_CONTRADICTED,
     };
     findings.iter().map(most).fold(1.0, f64::min)
@@ -72,6 +76,9 @@ fn max_confidence(findings: &[Finding]) -> f64 {
 fn findings(d: &Diagnosis, context: &Context) -> Vec<Finding> {
     let mut out = Vec::new();
     let mut add = |kind: FindingKind, message: String| out.push(Finding { kind, message });
+    for b in d.base_parameters.iter().filter(|b| b.out_of_tolerance) {
+        add(FindingKind::OutOfTolerance, out_of_tolerance(b));
+    }
     if let Some(message) = prediction_error(&d.gain, context.resolution_n) {
         add(FindingKind::PredictionError, message);
     }
@@ -138,6 +145,56 @@ fn parameters_at_bound(d: &Diagnosis) -> Vec<String> {
     let of_causes =
         d.causes.iter().flat_map(|c| c.at_bound.iter().map(|path| format!("{path} of {}", c.effect)));
     base.chain(of_causes).collect()
+}
+
+/// Compares the parameters with the scenario's, whatever the fit started from.
+pub(crate) fn compare_with_scenario(parameters: &mut [BaseParameter], scenario: &Scenario) {
+    for b in parameters {
+        let layer = b.layer.checked_sub(1).and_then(|l| scenario.tissue.layers.get(l));
+        let (assumed, tolerance) = match (b.name.as_str(), layer) {
+            ("stiffness_n_per_m", Some(l)) => (l.stiffness_n_per_m, scenario.tolerance * l.stiffness_n_per_m),
+            ("friction_ns_per_m2", Some(l)) => (l.friction_ns_per_m2, scenario.tolerance * l.friction_ns_per_m2),
+            ("puncture_n", Some(l)) => {
+                let assumed = l.puncture_n.unwrap_or(b.assumed);
+                (assumed, scenario.tolerance * assumed)
+            }
+            ("thickness_m", Some(l)) => (l.thickness_m, scenario.thickness_tolerance * l.thickness_m),
+            _ => (scenario.tissue.surface_m, scenario.surface_tolerance_m),
+        };
+        b.assumed = assumed;
+        b.changed = assumed < b.low || assumed > b.high;
+        b.out_of_tolerance = b.low > assumed + tolerance || (b.high < assumed - tolerance && !b.at_least);
+    }
+}
+
+/// A parameter outside its tolerance, in words.
+fn out_of_tolerance(b: &BaseParameter) -> String {
+    let (scale, unit) = match b.name.as_str() {
+        "stiffness_n_per_m" => (1.0, "N/m"),
+        "friction_ns_per_m2" => (1.0, "N s/m²"),
+        "puncture_n" => (1.0, "N"),
+        _ => (1e3, "mm"),
+    };
+    let what = b.name.split('_').next().unwrap_or_default();
+    let what = match what {
+        "puncture" => "puncture force",
+        what => what,
+    };
+    let of = if b.layer > 0 { format!("{what} of layer {}", b.layer) } else { format!("position of the {what}") };
+    let number = |x: f64| significant(scale * x, 3);
+    let off = if b.layer == 0 {
+        format!("off by {} mm", number((b.value - b.assumed).abs()))
+    } else {
+        let (factor, word) =
+            if b.assumed > b.value { (b.assumed / b.value, "large") } else { (b.value / b.assumed, "small") };
+        format!("{} times too {word}", significant(factor, 2))
+    };
+    let fitted = if b.at_least {
+        format!("at least {}", number(b.low))
+    } else {
+        format!("{} ({} to {})", number(b.value), number(b.low), number(b.high))
+    };
+    format!("the assumed {of} is {off}: {fitted}, not {} {unit}", number(b.assumed))
 }
 
 /// Name of a base parameter with its layer.

@@ -1,7 +1,7 @@
 //! Diagnosis of recordings: which effects the scenario lacks, with intervals, and the improvement on held-out
 //! recordings.
 
-use crate::base_law_fit::{PreparedRecordings, fit_base_law, refit_with_random_effects};
+use crate::base_law_fit::{PreparedRecordings, refit_with_random_effects};
 use crate::baseline_search::search_with_baseline;
 use crate::claims::{self, Context, have_one_motion};
 use crate::competing_effects::{CompetingEffect, find_competing_effects};
@@ -18,6 +18,7 @@ use crate::identifiability::{advice, not_identifiable};
 use crate::input_checks::{
     CleanRecordings, NamedRecording, check_recordings, clean_recordings, force_outlier_notes,
 };
+use crate::measured_start::fit_base_law_from_any_start;
 use crate::motion_period::common_motion_period_s;
 use crate::negligible_effects::{Negligible, negligible_effects};
 use crate::partial_model::partial_model;
@@ -86,7 +87,8 @@ pub fn diagnose(
         blocks,
         raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD,
     );
-    let (base, data) = fit_base_law(&prepared).ok_or(DiagnoseError::NoFit)?;
+    let (prepared, base, data) =
+        fit_base_law_from_any_start(prepared, &clean).ok_or(DiagnoseError::NoFit)?;
     let (base, data) = select_random_effects(base, data);
     let (base, data) = refit_with_random_effects(&prepared, base, data);
     let (mut search, prepared) = search_with_baseline(&prepared, base, data, &mut progress);
@@ -230,6 +232,7 @@ pub fn diagnose(
         air_noise_n: air_noise_n(scenario, &search.data),
         resolution_n: raw.step_n.unwrap_or(0.0),
     };
+    claims::compare_with_scenario(&mut diagnosis.base_parameters, scenario);
     claims::apply(&mut diagnosis, &context);
     let extended_scenario = extended_scenario(scenario, &search, &diagnosis);
     Ok(DiagnosisResult {

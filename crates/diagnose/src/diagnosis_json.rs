@@ -16,6 +16,8 @@ pub enum Verdict {
     Ambiguous,
     /// The residual has structure that no effect of the library explains.
     Unknown,
+    /// No effect is missing, but parameters of the base law are outside their tolerance.
+    Parameters,
 }
 
 /// A value with its 95 % interval.
@@ -90,6 +92,9 @@ pub struct BaseParameter {
     /// Whether the value is only a lower limit: a puncture force that no recording reached, which is at least `low`.
     #[serde(default)]
     pub at_least: bool,
+    /// Whether the whole interval lies outside the tolerance that the scenario states.
+    #[serde(default)]
+    pub out_of_tolerance: bool,
 }
 
 /// Improvement of the prediction.
@@ -206,6 +211,8 @@ pub enum FindingKind {
     ResidualStructure,
     /// A parameter stands at its bound.
     AtBound,
+    /// A parameter is outside the tolerance of the assumed value.
+    OutOfTolerance,
     /// Recordings differ too much for one model.
     Scatter,
     /// The noise is far above that of the scenario's sensor, or above that in air.

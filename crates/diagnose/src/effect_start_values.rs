@@ -45,7 +45,12 @@ fn starts_of(
     prepared: &PreparedRecordings,
     tones_hz: &[f64],
 ) -> Vec<EffectStart> {
+    let assumed = &score_test.fit.model.assumed;
     match info.proposal {
+        // It scales all thicknesses.
+        Proposal::LinearColumns(_) if info.stage == ChainStage::Position && assumed.is_geometry_guessed() => {
+            Vec::new()
+        }
         Proposal::LinearColumns(groups) => {
             groups.iter().filter_map(|g| start_of_columns(info, score_test, g)).collect()
         }

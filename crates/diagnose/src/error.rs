@@ -6,6 +6,11 @@ pub enum DiagnoseError {
     /// No recording.
     #[error("no recording was given; name at least one with --data")]
     NoRecording,
+    /// No layers to start from.
+    #[error(
+        "no recording shows a contact, so there are no layers to start from; look at `stylet enhance`'s report, or name a scenario"
+    )]
+    NoContact,
     /// More layers than a diagnosis can distinguish.
     #[error(
         "the scenario has {layers} layers; a diagnosis distinguishes up to {most}: merge neighbouring layers of the same tissue"

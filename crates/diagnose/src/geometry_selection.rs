@@ -51,6 +51,9 @@ fn with_fixed_geometry(model: &Model, free: FreeParameters) -> Model {
 /// Fixes the geometry that agrees with the prior; returns whether an effect was added for it.
 pub fn fix_geometry(search: &mut Search, prepared: &PreparedRecordings) -> bool {
     let best = &search.best;
+    if best.model.assumed.is_geometry_guessed() {
+        return false;
+    }
     let times = prepared.drop_times();
     let free = |surface, thickness| FreeParameters { surface, thickness, ..best.model.free };
     let mut tried: Vec<Model> = [free(false, false), free(true, false), free(false, true)]

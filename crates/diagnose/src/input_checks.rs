@@ -36,6 +36,20 @@ const MIN_RECORDINGS_FOR_OUTLIER: usize = 3;
 /// below the median of the others.
 const OUTLIER_FORCE_FACTOR: f64 = 2.0;
 
+/// Checks that there are recordings with enough usable samples.
+pub(crate) fn check_length(recordings: &[NamedRecording]) -> Result<(), DiagnoseError> {
+    if recordings.is_empty() {
+        return Err(DiagnoseError::NoRecording);
+    }
+    for e in recordings {
+        let samples = (0..e.recording.len()).filter(|i| is_finite_sample(&e.recording, *i)).count();
+        if samples < MIN_SAMPLES {
+            return Err(DiagnoseError::TooShort { name: e.name.clone(), samples, least: MIN_SAMPLES });
+        }
+    }
+    Ok(())
+}
+
 /// Checks length, reach, units and signs of all recordings.
 ///
 /// Returns each recording's force ratio, measured over expected force; `None` where the two do not correlate.
@@ -43,9 +57,7 @@ pub(crate) fn check_recordings(
     scenario: &Scenario,
     recordings: &[NamedRecording],
 ) -> Result<Vec<Option<f64>>, DiagnoseError> {
-    if recordings.is_empty() {
-        return Err(DiagnoseError::NoRecording);
-    }
+    check_length(recordings)?;
     let layers = scenario.tissue.layers.len();
     if layers > MAX_LAYERS {
         return Err(DiagnoseError::TooManyLayers { layers, most: MAX_LAYERS });
@@ -56,9 +68,6 @@ pub(crate) fn check_recordings(
         let r = &e.recording;
         let usable: Vec<usize> = (0..r.len()).filter(|i| is_finite_sample(r, *i)).collect();
         let name = || e.name.clone();
-        if usable.len() < MIN_SAMPLES {
-            return Err(DiagnoseError::TooShort { name: name(), samples: usable.len(), least: MIN_SAMPLES });
-        }
         let deepest_m = usable.iter().fold(f64::NEG_INFINITY, |m, &i| m.max(r.position_m[i]));
         let lowest_m = usable.iter().fold(f64::INFINITY, |m, &i| m.min(r.position_m[i]));
         let depth_m = end_m - surface_m;

@@ -36,13 +36,15 @@ mod error;
 mod fast_tone_cause;
 mod fast_tones;
 mod general_forms;
+mod found_tissue;
 pub mod geometry_selection;
 pub mod held_out;
 mod identifiability;
 mod input_checks;
 mod local_minima;
 mod mains_frequency;
-pub mod model_comparison;
+mod measured_start;
+mod model_comparison;
 mod model_pruning;
 mod motion_period;
 pub mod negligible_effects;
@@ -70,6 +72,7 @@ pub use diagnose::{DiagnosisResult, Options, REASON_IMITATES_UNMODELLED, assumpt
 pub use diagnosis_json::{Diagnosis, Verdict};
 pub use error::DiagnoseError;
 pub use input_checks::NamedRecording;
+pub use measured_start::scenario_from_recordings;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

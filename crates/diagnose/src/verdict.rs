@@ -287,6 +287,7 @@ fn base_parameters(search: &Search, covariance: &Covariance) -> Vec<BaseParamete
             changed: assumed < low || assumed > high,
             at_bound: covariance.at_bound(role),
             at_least: open_above.is_some(),
+            out_of_tolerance: false,
         });
     };
     for (l, layer) in assumed_tissue.layers.iter().enumerate() {

@@ -82,6 +82,29 @@ fn seed() -> u64 {
 }
 
 impl Scenario {
+    /// A scenario with the default of every other field.
+    #[must_use]
+    pub fn new(name: String, tissue: Tissue, motion: Motion) -> Self {
+        Self {
+            name,
+            source: String::new(),
+            tissue,
+            effects: Vec::new(),
+            motion,
+            robot: Robot::default(),
+            sensor: Sensor::default(),
+            enhance: EnhanceConfig::default(),
+            enhance_virtual: None,
+            compare: Vec::new(),
+            sample_hz: sample_hz(),
+            physics_hz: physics_hz(),
+            tolerance: tolerance(),
+            thickness_tolerance: thickness_tolerance(),
+            surface_tolerance_m: surface_tolerance_m(),
+            seed: seed(),
+        }
+    }
+
     /// The models to run: `enhance.model` first, then those of `compare` that differ.
     #[must_use]
     pub fn models(&self) -> Vec<Model> {

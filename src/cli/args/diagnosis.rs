@@ -3,7 +3,7 @@
 use crate::cli::output_args::OutputArgs;
 use crate::cli::resource_limits::ResourceLimits;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use stylet_api::DiagnosisInputs;
 
 /// Arguments of `stylet diagnose`.
@@ -13,13 +13,15 @@ use stylet_api::DiagnosisInputs;
   stylet diagnose scenario.ron --data log1.csv log2.csv --columns map.ron
   stylet diagnose scenario.ron --repeats --data run1.csv run2.csv run3.csv --columns map.ron
   stylet diagnose scenarios/measured/skin_on_muscle.ron
+  stylet diagnose --data log1.csv log2.csv
 
 Writes report.html, diagnosis.json and extended.ron: the scenario with re-fitted parameters and the
 effects found, ready for `stylet run` (give it a motion if the scenario says `Recorded`). The exit code
 is 0 whatever the verdict, 2 when an input is wrong.")]
 pub struct DiagnoseArgs {
-    /// Assumed scenario, or a data set of repeated insertions (RON).
-    pub scenario: PathBuf,
+    /// Assumed scenario, or a data set of repeated insertions (RON). Without one the layers are those that
+    /// the recordings show, as `stylet identify` finds them.
+    pub scenario: Option<PathBuf>,
     /// Treat the recordings as repeats of one insertion: separate the variation between recordings from
     /// what the model lacks, and predict each recording by the others. A data set implies it.
     #[arg(long)]
@@ -40,15 +42,43 @@ pub struct DiagnoseArgs {
 }
 
 impl DiagnoseArgs {
-    /// Scenario, recordings and column map.
-    pub fn inputs(&self) -> DiagnosisInputs {
+    /// A scenario with recordings and column map.
+    pub fn inputs(&self, scenario: &Path) -> DiagnosisInputs {
         DiagnosisInputs {
-            scenario: self.scenario.clone(),
+            scenario: scenario.to_owned(),
             data: self.data.clone(),
             columns: self.columns.clone(),
             repair: self.repair,
         }
     }
+}
+
+/// Arguments of `stylet identify`.
+#[derive(Clone, Debug, Args)]
+#[command(after_help = "Examples:
+  stylet identify --data log1.csv log2.csv --out phantom.ron
+  stylet identify --data log.csv --columns map.ron --layers 3
+
+Writes phantom.ron (layers with thickness, stiffness, friction and puncture force, and the effects found
+in the recordings), report.html and diagnosis.json. Recordings with different motions determine more than
+repeats of one: at one constant speed stiffness and friction cannot be told apart.")]
+pub struct IdentifyArgs {
+    /// Recordings (CSV with header).
+    #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
+    pub data: Vec<PathBuf>,
+    /// Number of layers [default: as many as the recordings show].
+    #[arg(long, value_name = "N")]
+    pub layers: Option<usize>,
+    /// Column map: names and units of the logs' columns (RON).
+    #[arg(long, value_name = "FILE")]
+    pub columns: Option<PathBuf>,
+    /// Drop rows with backward or repeated time stamps, and report which.
+    #[arg(long)]
+    pub repair: bool,
+    #[command(flatten)]
+    pub results: OutputArgs,
+    #[command(flatten)]
+    pub limits: ResourceLimits,
 }
 
 /// Arguments of `stylet predict`.

@@ -13,7 +13,7 @@ pub use benchmark::{
     BenchmarkArgs, BenchmarkCommand, BenchmarkDiagnoseArgs, BenchmarkExportArgs, BenchmarkPlanArgs,
     BenchmarkScoreArgs,
 };
-pub use diagnosis::{DiagnoseArgs, EffectsArgs, IdentifiabilityArgs, PlanArgs, PredictArgs, RefitArg};
+pub use diagnosis::{DiagnoseArgs, EffectsArgs, IdentifiabilityArgs, IdentifyArgs, PlanArgs, PredictArgs, RefitArg};
 pub use inspect::InspectArgs;
 pub use recordings::{ConvertArgs, EnhanceArgs, ListenArgs};
 pub use simulation::{AlgorithmArg, CompareArgs, ReproduceArgs, RunArgs};
@@ -58,6 +58,8 @@ pub enum Command {
     Compare(CompareArgs),
     /// Compare measured data with a scenario: which effects it lacks, and how much the fit improves.
     Diagnose(DiagnoseArgs),
+    /// Find the layers of a phantom in recordings, without a scenario, and diagnose what is left.
+    Identify(IdentifyArgs),
     /// Predict held-out recordings by the model of a diagnosis.
     Predict(PredictArgs),
     /// List which effects an experiment can identify, from which size on, and which it confuses.

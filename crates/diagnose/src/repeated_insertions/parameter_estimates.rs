@@ -140,6 +140,7 @@ pub fn base_parameters(estimates: &[ParameterEstimate], assumed_tissue: &Tissue)
                 changed: !(t.low <= assumed && assumed <= t.high),
                 at_bound: t.at_bound,
                 at_least: false,
+                out_of_tolerance: false,
             })
         })
         .collect()

@@ -73,6 +73,7 @@ words! {
         ScatterSurface = "scatter_surface": "the surface scatters by 1, 3, 6 % of the first layer between recordings",
         Five = "five": "thickness, surface, coefficients, encoder and growing noise at once, at half the size",
         Geometry = "geometry": "thickness and surface off at once, each as much as in its own row",
+        Guess = "guess": "every layer's thickness, K, b, F assumed off by a factor of up to 1.6, 3, 10",
     }
 }
 

@@ -95,6 +95,9 @@ fn attempt_at(id: &CaseId, attempt: u64) -> CaseSetup {
     // Slightly inside the range, so that the last step of the search need not be exact.
     let target = log_uniform(&mut rng, 1.1 * low, 0.9 * high) * setup.noise.sd_n;
     hide_effects(&mut rng, id, &mut setup, target);
+    if setup.amounts.guess > 1.0 {
+        setup.assumed = draw_tissue::draw_guessed_tissue(&mut rng, &setup.assumed, &setup.amounts);
+    }
     setup
 }
 

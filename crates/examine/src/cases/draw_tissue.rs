@@ -90,6 +90,19 @@ pub fn draw_true_tissue(rng: &mut ChaCha8Rng, assumed: &Tissue, amounts: &Misspe
     truth
 }
 
+/// The stack as a scenario guesses it: every number wrong by a factor of its own.
+pub fn draw_guessed_tissue(rng: &mut ChaCha8Rng, assumed: &Tissue, amounts: &MisspecificationAmounts) -> Tissue {
+    let mut guess = assumed.clone();
+    let mut off = || log_uniform(rng, 1.0 / amounts.guess, amounts.guess);
+    for layer in &mut guess.layers {
+        layer.thickness_m *= off();
+        layer.stiffness_n_per_m *= off();
+        layer.friction_ns_per_m2 *= off();
+        layer.puncture_n = layer.puncture_n.map(|f| f * off());
+    }
+    guess
+}
+
 /// The stack that one recording meets.
 pub fn draw_encountered_tissue(
     rng: &mut ChaCha8Rng,

@@ -26,6 +26,8 @@ pub struct MisspecificationAmounts {
     pub surface_each_m: f64,
     /// K, b, F, relative.
     pub coefficients: f64,
+    /// Largest factor by which the scenario's thickness, K, b, F are too large or too small.
+    pub guess: f64,
     /// Standard deviation of the encoder's noise in m.
     pub encoder_m: f64,
     /// Step of the encoder in m.
@@ -79,6 +81,7 @@ impl MisspecificationAmounts {
             surface_m: 0.0,
             surface_each_m: 0.0,
             coefficients: 0.05,
+            guess: 1.0,
             encoder_m: 0.0,
             encoder_step_m: 0.0,
             jitter: 0.0,
@@ -111,6 +114,7 @@ impl MisspecificationAmounts {
             Wrong::Surface => it.surface_m = pick([0.5e-3, 1e-3, 2e-3]),
             Wrong::SurfaceEach => it.surface_each_m = pick([0.5e-3, 1e-3, 2e-3]),
             Wrong::Coefficients => it.coefficients = pick([0.10, 0.20, 0.28]),
+            Wrong::Guess => it.guess = pick([1.6, 3.0, 10.0]),
             Wrong::Encoder => it.encoder_m = pick([2e-6, 10e-6, 20e-6]),
             Wrong::EncoderSteps => it.encoder_step_m = pick([5e-6, 20e-6, 50e-6]),
             Wrong::Jitter => it.jitter = pick([0.1, 0.2, 0.3]),

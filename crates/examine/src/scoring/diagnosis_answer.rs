@@ -75,6 +75,8 @@ pub enum Verdict {
     Ambiguous,
     /// Structure that no effect of the library explains dominates.
     Unknown,
+    /// No cause, but numbers of the scenario are wrong.
+    Parameters,
 }
 
 /// An answer.

@@ -14,6 +14,7 @@
 //!    `1 + eps`, K over `1 + eps`, b over its square. Within the tolerances both the name and `none` are right.
 //! 5. **`boundary_shift` is two thicknesses**: within the tolerance of both layers the name and `none` are right, beyond the
 //!    tolerance of either only the name.
+//!    Where the thicknesses are a guess, so are both.
 //! 6. **A puncture that depends on speed cannot be seen in one recording**, in which every layer is punctured once: name or
 //!    `none`.
 //! 7. **Lags and delays below one sampling interval** cannot be distinguished: either name is accepted.
@@ -128,6 +129,7 @@ fn expected_cause(effect: &Effect, setup: &CaseSetup) -> ExpectedCause {
         unseen: false,
     };
     let interval_s = 1.0 / setup.amounts.rate_hz;
+    let is_guess = setup.amounts.guess > 1.0;
     let passes_for_dry = || {
         unexplained_rms_n(setup, core::slice::from_ref(effect), None, RefitTerms::DryFriction)
             < DRY_FRICTION_LIMIT_SD * setup.noise.sd_n
@@ -138,12 +140,14 @@ fn expected_cause(effect: &Effect, setup: &CaseSetup) -> ExpectedCause {
             it.may_be_silent = true;
         }
         Effect::PositionScale { eps } => {
-            it.may_be_silent = eps.abs() + setup.amounts.thickness <= THICKNESS_TOLERANCE;
+            it.may_be_silent =
+                is_guess || eps.abs() + setup.amounts.thickness <= THICKNESS_TOLERANCE;
         }
         Effect::BoundaryShift { layer, shift_m } => {
             let thick = |i: usize| setup.assumed.layers.get(i).map_or(0.0, |l| l.thickness_m);
             let least = thick(layer - 1).min(thick(layer));
-            it.may_be_silent = shift_m.abs() <= (THICKNESS_TOLERANCE + setup.amounts.thickness) * least;
+            it.may_be_silent =
+                is_guess || shift_m.abs() <= (THICKNESS_TOLERANCE + setup.amounts.thickness) * least;
         }
         Effect::RateDependentPuncture { .. } => it.may_be_silent = setup.paths.len() == 1,
         Effect::LowPassLag { time_constant_s } if time_constant_s < interval_s => {

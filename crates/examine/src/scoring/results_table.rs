@@ -142,6 +142,7 @@ fn said(out: &mut String, outcomes: &[CaseOutcome]) {
         let said = match o.verdict {
             _ if o.failed.is_some() => "no answer".to_owned(),
             Verdict::None => "none".to_owned(),
+            Verdict::Parameters if causes.is_empty() => "parameters".to_owned(),
             Verdict::Unknown if causes.is_empty() => "unknown".to_owned(),
             Verdict::Unknown => format!("unknown, with {}", causes.join(" + ")),
             _ => causes.join(" + "),

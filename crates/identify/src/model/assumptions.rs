@@ -14,3 +14,14 @@ pub struct Assumptions {
     /// Tolerance of the surface position in m.
     pub surface_tolerance_m: f64,
 }
+
+/// Relative tolerance of a thickness from which it is a guess.
+const GUESSED_TOLERANCE: f64 = 0.5;
+
+impl Assumptions {
+    /// Whether no thickness is known: where a layer boundary is found then tells nothing about an effect that would move it.
+    #[must_use]
+    pub fn is_geometry_guessed(&self) -> bool {
+        self.thickness_tolerance.iter().all(|t| *t >= GUESSED_TOLERANCE)
+    }
+}

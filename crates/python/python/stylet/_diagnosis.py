@@ -24,7 +24,7 @@ class Diagnosis:
 
     @property
     def verdict(self) -> str:
-        """`none`, `named`, `ambiguous` or `unknown`."""
+        """`none`, `named`, `ambiguous`, `unknown` or `parameters`."""
         return self.result["verdict"]
 
     @property

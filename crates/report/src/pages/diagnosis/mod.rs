@@ -75,6 +75,7 @@ fn verdict(d: &Diagnosis) -> Section {
         Verdict::Named => "named",
         Verdict::Ambiguous => "ambiguous",
         Verdict::Unknown => "unknown",
+        Verdict::Parameters => "parameters",
     };
     let mut tiles = vec![Tile::new("Verdict", word, summary_sentence(d))];
     for c in &d.causes {

@@ -70,6 +70,11 @@ fn verdict(d: &Diagnosis) -> String {
             let but = first.map_or_else(String::new, |f| format!(", but {}", f.message));
             format!("No effect of the library is needed beyond the base law{but}.")
         }
+        Verdict::Parameters => {
+            let off = d.findings.iter().filter(|f| f.kind == FindingKind::OutOfTolerance);
+            let off: Vec<&str> = off.map(|f| f.message.as_str()).collect();
+            format!("No effect of the library is missing, but numbers of the scenario are wrong: {}.", off.join("; "))
+        }
         Verdict::Named => format!("The simulation lacks {}.", names()),
         Verdict::Ambiguous => {
             let class = |c: &Cause| {

@@ -1,0 +1,96 @@
+//! Layers of a tissue from the recordings alone, as the online algorithm finds them: no scenario is needed.
+
+use rayon::prelude::*;
+use stylet_core::EnhanceConfig;
+use stylet_record::Recording;
+use stylet_score::{FoundLayer, Trace, found_layers};
+use stylet_stats::median_of;
+use stylet_tissue::{Layer, Tissue};
+
+/// Thinnest layer in m.
+const MIN_THICKNESS_M: f64 = 5e-4;
+/// Elastic force of the last layer at the deepest point, relative to the largest force, below which the tip has left the
+/// tissue.
+const MIN_FORCE_SHARE: f64 = 0.01;
+
+/// Layers that the online algorithm found in several recordings: medians over those with the same number of layers.
+pub(crate) struct FoundTissue {
+    /// Position of the surface in m.
+    pub surface_m: f64,
+    /// The layers.
+    pub layers: Vec<MedianLayer>,
+}
+
+/// Median of a layer over the recordings.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MedianLayer {
+    /// Stiffness in N/m.
+    pub stiffness_n_per_m: f64,
+    /// Friction in N s/m².
+    pub friction_ns_per_m2: f64,
+    /// Thickness in m; of a layer that did not rupture, what the needle reached.
+    pub thickness_m: f64,
+    /// Elastic force in N at the rupture; `None` without a rupture.
+    pub rupture_n: Option<f64>,
+    /// Whether it ruptured before its far face.
+    pub by_force: bool,
+}
+
+impl FoundTissue {
+    /// The tissue with `count` layers, by default with the most frequent number of them. `None` without a contact.
+    pub(crate) fn new(recordings: &[Recording], count: Option<usize>) -> Option<Self> {
+        let config = EnhanceConfig::default();
+        let layers = |r: &Recording| {
+            let trace = Trace::run(r, &r.force_n, &config, 0.0, |_, _| {});
+            Some(without_exit(found_layers(&trace, &r.position_m)?, r))
+        };
+        let all: Vec<Vec<FoundLayer>> = recordings.par_iter().filter_map(layers).collect();
+        let has = |n: &usize| all.iter().any(|found| found.len() == *n);
+        let count = count.filter(has).or_else(|| most_frequent(all.iter().map(Vec::len)))?;
+        let alike: Vec<&Vec<FoundLayer>> = all.iter().filter(|found| found.len() == count).collect();
+        let surface_m = median_of(alike.iter().map(|found| found[0].front_m));
+        let layer = |k: usize| {
+            let median = |value: fn(&FoundLayer) -> f64| median_of(alike.iter().map(|found| value(&found[k])));
+            let ruptures: Vec<f64> = alike.iter().filter_map(|found| found[k].rupture_force_n()).collect();
+            let by_force = alike.iter().filter(|found| found[k].is_ruptured_by_force()).count();
+            MedianLayer {
+                stiffness_n_per_m: median(|l| l.stiffness_n_per_m),
+                friction_ns_per_m2: median(|l| l.friction_ns_per_m2),
+                thickness_m: median(|l| l.thickness_m).max(MIN_THICKNESS_M),
+                rupture_n: (!ruptures.is_empty()).then(|| median_of(ruptures)),
+                by_force: 2 * by_force > alike.len(),
+            }
+        };
+        Some(Self { surface_m, layers: (0..count).map(layer).collect() })
+    }
+
+    /// As a tissue of a scenario. The last layer continues below the deepest point.
+    pub(crate) fn tissue(&self) -> Tissue {
+        /// Part of the last layer below the deepest point, relative to what was reached.
+        const BEYOND_SHARE: f64 = 0.2;
+        let layer = |(k, l): (usize, &MedianLayer)| Layer {
+            name: format!("layer {}", k + 1),
+            thickness_m: if l.rupture_n.is_some() { l.thickness_m } else { (1.0 + BEYOND_SHARE) * l.thickness_m },
+            stiffness_n_per_m: l.stiffness_n_per_m.max(1e-9),
+            friction_ns_per_m2: l.friction_ns_per_m2.max(1e-9),
+            puncture_n: l.rupture_n.filter(|force_n| l.by_force && *force_n > 0.0),
+        };
+        Tissue { surface_m: self.surface_m, layers: self.layers.iter().enumerate().map(layer).collect() }
+    }
+}
+
+/// The layers without a last one in which no elastic force acts: the tip has left the tissue.
+fn without_exit(mut found: Vec<FoundLayer>, recording: &Recording) -> Vec<FoundLayer> {
+    let peak_n = recording.force_n.iter().copied().fold(0.0, f64::max);
+    let leaves = |l: &FoundLayer| l.stiffness_n_per_m * l.thickness_m < MIN_FORCE_SHARE * peak_n;
+    if found.len() > 1 && found.last().is_some_and(leaves) {
+        found.pop();
+    }
+    found
+}
+
+/// The most frequent value, the largest of several.
+fn most_frequent(values: impl Iterator<Item = usize>) -> Option<usize> {
+    let values: Vec<usize> = values.collect();
+    values.iter().copied().max_by_key(|v| (values.iter().filter(|x| *x == v).count(), *v))
+}

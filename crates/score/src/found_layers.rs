@@ -1,0 +1,69 @@
+//! Layers of the tissue as the online algorithm found them in one recording.
+
+use crate::enhancement_trace::Trace;
+
+/// Distance in m from which a rupture before the next layer's front counts as one inside the layer.
+const MIN_GAP_M: f64 = 5e-4;
+
+/// A layer that the online algorithm found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoundLayer {
+    /// Position of its front in m.
+    pub front_m: f64,
+    /// Thickness in m; of the last one, what the needle reached.
+    pub thickness_m: f64,
+    /// Stiffness in N/m.
+    pub stiffness_n_per_m: f64,
+    /// Friction in N s/m².
+    pub friction_ns_per_m2: f64,
+    /// Position of its rupture in m; `None` for the last one.
+    pub rupture_m: Option<f64>,
+}
+
+impl FoundLayer {
+    /// Elastic force at the rupture in N.
+    #[must_use]
+    pub fn rupture_force_n(&self) -> Option<f64> {
+        self.rupture_m.map(|m| self.stiffness_n_per_m * (m - self.front_m))
+    }
+
+    /// Whether it ruptured before its far face.
+    #[must_use]
+    pub fn is_ruptured_by_force(&self) -> bool {
+        self.rupture_m.is_some_and(|m| m < self.front_m + self.thickness_m - 1e-9)
+    }
+}
+
+/// The layers from the contact to the deepest position, in order. `None` without a contact.
+///
+/// A layer ends at its rupture, or where the next one begins if that is further on: the tip was free between them.
+#[must_use]
+pub fn found_layers(trace: &Trace, position_m: &[f64]) -> Option<Vec<FoundLayer>> {
+    let mut front_m = trace.contact_m?;
+    let deepest = (0..position_m.len()).max_by(|a, b| position_m[*a].total_cmp(&position_m[*b]))?;
+    let estimate = |layer: usize| trace.estimates.iter().find(|e| e.layer == layer);
+    let mut layers = Vec::new();
+    for (k, detection) in trace.detections.iter().enumerate() {
+        let Some(e) = estimate(detection.layer) else { continue };
+        let next_m = trace.detections.get(k + 1).and_then(|next| Some(estimate(next.layer)?.start_m));
+        let back_m = next_m.filter(|m| *m > detection.located_m + MIN_GAP_M).unwrap_or(detection.located_m);
+        layers.push(FoundLayer {
+            front_m,
+            thickness_m: back_m - front_m,
+            stiffness_n_per_m: e.stiffness_n_per_m,
+            friction_ns_per_m2: e.friction,
+            rupture_m: Some(detection.located_m),
+        });
+        front_m = back_m;
+    }
+    let last = |column: &[f64]| column.iter().take(deepest + 1).rev().copied().find(|v| v.is_finite());
+    let [stiffness, friction] = [&trace.stiffness_n_per_m, &trace.friction].map(|c| last(c).unwrap_or(0.0));
+    layers.push(FoundLayer {
+        front_m,
+        thickness_m: position_m[deepest] - front_m,
+        stiffness_n_per_m: stiffness,
+        friction_ns_per_m2: friction,
+        rupture_m: None,
+    });
+    Some(layers)
+}

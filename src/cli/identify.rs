@@ -1,0 +1,143 @@
+//! `stylet identify`, and `stylet diagnose` without a scenario: the layers of a phantom from recordings alone.
+
+use crate::cli::args::{DiagnoseArgs, IdentifyArgs};
+use crate::cli::diagnose::summary;
+use crate::cli::exit_codes::Failure;
+use crate::cli::terminal_output::stage_printer;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use stylet_api::output_folder::{check_folder, write_file_atomically};
+use stylet_api::{DiagnosisInputs, resource_estimate};
+use stylet_diagnose::Diagnosis;
+use stylet_report::significant;
+
+/// File with the layers that the diagnosis started from.
+const FOUND_FILE: &str = "assumed.ron";
+/// First words of a phantom, by which an earlier one is recognised.
+const PHANTOM_COMMENT: &str = "// Phantom identified by stylet";
+/// Half width of an interval, relative to the value, from which the data do not determine it.
+const UNDETERMINED_SHARE: f64 = 0.5;
+
+/// `stylet identify`.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits.
+pub fn identify(args: &IdentifyArgs) -> Result<(), Failure> {
+    let mut args = args.clone();
+    let phantom = args.results.out.take_if(|out| out.extension().is_some_and(|e| e == "ron"));
+    if let Some(phantom) = &phantom {
+        check_phantom(phantom)?;
+    }
+    run(&args, phantom.as_deref(), |d| format!("{}\n{}", layers(d), summary(d)))
+}
+
+/// `stylet diagnose` without a scenario.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits.
+pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
+    let args = IdentifyArgs {
+        data: args.data.clone(),
+        layers: None,
+        columns: args.columns.clone(),
+        repair: args.repair,
+        results: args.results.clone(),
+        limits: args.limits,
+    };
+    run(&args, None, |d| format!("No scenario was given: the layers are those that the recordings show.\n{}\n{}", layers(d), summary(d)))
+}
+
+fn run(
+    args: &IdentifyArgs,
+    phantom: Option<&Path>,
+    summary: impl FnOnce(&Diagnosis) -> String,
+) -> Result<(), Failure> {
+    let Some(first) = args.data.first() else {
+        return Err(Failure::Check("no recordings: name them with --data A.csv B.csv".to_owned()));
+    };
+    args.limits.check(first, &resource_estimate::estimate_diagnose(&args.data), args.results.quiet)?;
+    let folder = args.results.output_folder(first, "-phantom");
+    let inputs = DiagnosisInputs {
+        scenario: folder.join(FOUND_FILE),
+        data: args.data.clone(),
+        columns: args.columns.clone(),
+        repair: args.repair,
+    };
+    let read = args.results.inputs(first, args.data.iter().skip(1).chain(&args.columns));
+    check_folder(&folder, "diagnosis.json", &read)?;
+    let recordings = inputs.read_recordings()?;
+    let name = first.file_stem().map_or_else(|| "phantom".to_owned(), |s| s.to_string_lossy().into_owned());
+    let limit = args.limits.start_time_limit(first);
+    let (scenario, found) = stylet_api::identify(
+        &name,
+        &recordings,
+        args.layers,
+        stage_printer(args.results.quiet, " ..."),
+    )?;
+    drop(limit);
+    let mut output = found.output(&scenario, &inputs)?;
+    output.add(FOUND_FILE, scenario.to_ron().map_err(stylet_api::Error::internal)?);
+    let text = phantom_ron(&found, &args.data)?;
+    output.add("phantom.ron", text.clone());
+    let output = output.with_inputs(read);
+    args.results.write_and_print(&folder, &output, || summary(&found.diagnosis))?;
+    if let Some(phantom) = phantom {
+        write_file_atomically(phantom, text.as_bytes())?;
+        if !args.results.quiet {
+            crate::cli::terminal_output::print(&format!("Phantom: {}\n", phantom.display()))?;
+        }
+    }
+    Ok(())
+}
+
+/// The phantom with a comment that says where it comes from.
+fn phantom_ron(found: &stylet_api::DiagnosisReport, data: &[PathBuf]) -> Result<String, Failure> {
+    let names: Vec<String> = data.iter().map(|p| p.display().to_string().replace(['\n', '\r'], " ")).collect();
+    let ron = found.extended.to_ron().map_err(stylet_api::Error::internal)?;
+    Ok(format!("{PHANTOM_COMMENT} {} in {}.\n{ron}", env!("CARGO_PKG_VERSION"), names.join(", ")))
+}
+
+/// Refuses to replace a file that is no earlier phantom.
+fn check_phantom(path: &Path) -> Result<(), Failure> {
+    let earlier = match std::fs::read(path) {
+        Ok(bytes) => bytes.starts_with(PHANTOM_COMMENT.as_bytes()),
+        Err(_) => true,
+    };
+    if earlier {
+        return Ok(());
+    }
+    Err(Failure::Check(format!(
+        "{}: exists and was not written by stylet identify; name another file",
+        path.display()
+    )))
+}
+
+/// The layers in words, with intervals.
+fn layers(d: &Diagnosis) -> String {
+    let value = |layer: usize, name: &str, scale: f64, unit: &str| -> Option<String> {
+        let b = d.base_parameters.iter().find(|b| b.layer == layer && b.name == name)?;
+        let number = |x: f64| significant(scale * x, 4);
+        if b.at_least {
+            return Some(format!("at least {} {unit}", number(b.low)));
+        }
+        let undetermined = b.high - b.low > 2.0 * UNDETERMINED_SHARE * b.value.abs() && name != "surface_m";
+        let remark = if undetermined { ", not determined" } else { "" };
+        Some(format!("{} {unit} ({} to {}{remark})", number(b.value), number(b.low), number(b.high)))
+    };
+    let count = d.base_parameters.iter().map(|b| b.layer).max().unwrap_or(0);
+    let mut out = String::new();
+    let surface = value(0, "surface_m", 1e3, "mm").map_or(String::new(), |at| format!(", surface at {at}"));
+    let _ = writeln!(out, "{count} layer{}{surface}", if count == 1 { "" } else { "s" });
+    for layer in 1..=count {
+        let parts = [
+            ("thickness", value(layer, "thickness_m", 1e3, "mm")),
+            ("K", value(layer, "stiffness_n_per_m", 1.0, "N/m")),
+            ("b", value(layer, "friction_ns_per_m2", 1.0, "N s/m²")),
+            ("ruptures at", value(layer, "puncture_n", 1.0, "N")),
+        ];
+        let parts: Vec<String> =
+            parts.into_iter().filter_map(|(name, text)| Some(format!("{name} {}", text?))).collect();
+        let _ = writeln!(out, "  layer {layer}: {}", parts.join(", "));
+    }
+    out
+}
