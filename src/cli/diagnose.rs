@@ -36,11 +36,7 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         ));
     }
     let scenario = Scenario::load(file)?;
-    args.limits.check(
-        file,
-        &resource_estimate::estimate_diagnose(&args.data),
-        args.results.quiet,
-    )?;
+    args.limits.check(file, &resource_estimate::estimate_diagnose(&args.data), args.results.quiet)?;
     let inputs = args.inputs(file);
     let folder = args.results.output_folder(file, "-diagnosis");
     let read = args.results.inputs(file, args.data.iter().chain(&args.columns));

@@ -44,7 +44,13 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         results: args.results.clone(),
         limits: args.limits,
     };
-    run(&args, None, |d| format!("No scenario was given: the layers are those that the recordings show.\n{}\n{}", layers(d), summary(d)))
+    run(&args, None, |d| {
+        format!(
+            "No scenario was given: the layers are those that the recordings show.\n{}\n{}",
+            layers(d),
+            summary(d)
+        )
+    })
 }
 
 fn run(
@@ -68,12 +74,8 @@ fn run(
     let recordings = inputs.read_recordings()?;
     let name = first.file_stem().map_or_else(|| "phantom".to_owned(), |s| s.to_string_lossy().into_owned());
     let limit = args.limits.start_time_limit(first);
-    let (scenario, found) = stylet_api::identify(
-        &name,
-        &recordings,
-        args.layers,
-        stage_printer(args.results.quiet, " ..."),
-    )?;
+    let (scenario, found) =
+        stylet_api::identify(&name, &recordings, args.layers, stage_printer(args.results.quiet, " ..."))?;
     drop(limit);
     let mut output = found.output(&scenario, &inputs)?;
     output.add(FOUND_FILE, scenario.to_ron().map_err(stylet_api::Error::internal)?);
@@ -92,7 +94,8 @@ fn run(
 
 /// The phantom with a comment that says where it comes from.
 fn phantom_ron(found: &stylet_api::DiagnosisReport, data: &[PathBuf]) -> Result<String, Failure> {
-    let names: Vec<String> = data.iter().map(|p| p.display().to_string().replace(['\n', '\r'], " ")).collect();
+    let names: Vec<String> =
+        data.iter().map(|p| p.display().to_string().replace(['\n', '\r'], " ")).collect();
     let ron = found.extended.to_ron().map_err(stylet_api::Error::internal)?;
     Ok(format!("{PHANTOM_COMMENT} {} in {}.\n{ron}", env!("CARGO_PKG_VERSION"), names.join(", ")))
 }

@@ -153,13 +153,16 @@ pub(crate) fn compare_with_scenario(parameters: &mut [BaseParameter], scenario: 
         let layer = b.layer.checked_sub(1).and_then(|l| scenario.tissue.layers.get(l));
         let (assumed, tolerance) = match (b.name.as_str(), layer) {
             ("stiffness_n_per_m", Some(l)) => (l.stiffness_n_per_m, scenario.tolerance * l.stiffness_n_per_m),
-            ("friction_ns_per_m2", Some(l)) => (l.friction_ns_per_m2, scenario.tolerance * l.friction_ns_per_m2),
+            ("friction_ns_per_m2", Some(l)) => {
+                (l.friction_ns_per_m2, scenario.tolerance * l.friction_ns_per_m2)
+            }
             ("puncture_n", Some(l)) => {
                 let assumed = l.puncture_n.unwrap_or(b.assumed);
                 (assumed, scenario.tolerance * assumed)
             }
             ("thickness_m", Some(l)) => (l.thickness_m, scenario.thickness_tolerance * l.thickness_m),
-            _ => (scenario.tissue.surface_m, scenario.surface_tolerance_m),
+            ("surface_m", _) => (scenario.tissue.surface_m, scenario.surface_tolerance_m),
+            _ => continue,
         };
         b.assumed = assumed;
         b.changed = assumed < b.low || assumed > b.high;
@@ -180,7 +183,8 @@ fn out_of_tolerance(b: &BaseParameter) -> String {
         "puncture" => "puncture force",
         what => what,
     };
-    let of = if b.layer > 0 { format!("{what} of layer {}", b.layer) } else { format!("position of the {what}") };
+    let of =
+        if b.layer > 0 { format!("{what} of layer {}", b.layer) } else { format!("position of the {what}") };
     let number = |x: f64| significant(scale * x, 3);
     let off = if b.layer == 0 {
         format!("off by {} mm", number((b.value - b.assumed).abs()))

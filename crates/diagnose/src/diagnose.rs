@@ -87,8 +87,7 @@ pub fn diagnose(
         blocks,
         raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD,
     );
-    let (prepared, base, data) =
-        fit_base_law_from_any_start(prepared, &clean).ok_or(DiagnoseError::NoFit)?;
+    let (prepared, base, data) = fit_base_law_from_any_start(prepared, &clean).ok_or(DiagnoseError::NoFit)?;
     let (base, data) = select_random_effects(base, data);
     let (base, data) = refit_with_random_effects(&prepared, base, data);
     let (mut search, prepared) = search_with_baseline(&prepared, base, data, &mut progress);

@@ -50,7 +50,8 @@ impl FoundTissue {
         let alike: Vec<&Vec<FoundLayer>> = all.iter().filter(|found| found.len() == count).collect();
         let surface_m = median_of(alike.iter().map(|found| found[0].front_m));
         let layer = |k: usize| {
-            let median = |value: fn(&FoundLayer) -> f64| median_of(alike.iter().map(|found| value(&found[k])));
+            let median =
+                |value: fn(&FoundLayer) -> f64| median_of(alike.iter().map(|found| value(&found[k])));
             let ruptures: Vec<f64> = alike.iter().filter_map(|found| found[k].rupture_force_n()).collect();
             let by_force = alike.iter().filter(|found| found[k].is_ruptured_by_force()).count();
             MedianLayer {
@@ -70,7 +71,11 @@ impl FoundTissue {
         const BEYOND_SHARE: f64 = 0.2;
         let layer = |(k, l): (usize, &MedianLayer)| Layer {
             name: format!("layer {}", k + 1),
-            thickness_m: if l.rupture_n.is_some() { l.thickness_m } else { (1.0 + BEYOND_SHARE) * l.thickness_m },
+            thickness_m: if l.rupture_n.is_some() {
+                l.thickness_m
+            } else {
+                (1.0 + BEYOND_SHARE) * l.thickness_m
+            },
             stiffness_n_per_m: l.stiffness_n_per_m.max(1e-9),
             friction_ns_per_m2: l.friction_ns_per_m2.max(1e-9),
             puncture_n: l.rupture_n.filter(|force_n| l.by_force && *force_n > 0.0),

@@ -62,16 +62,18 @@ pub fn scenario_from_recordings(
     Ok(scenario)
 }
 
-/// Whether a fitted stiffness, friction, puncture force or thickness is outside the tolerance of the assumed one.
+/// Whether a fitted surface, stiffness, friction, puncture force or thickness is outside the tolerance of the assumed one.
 fn is_out_of_tolerance(assumed: &Assumptions, fit: &Fit) -> bool {
+    let moved_m = (assumed.tissue.surface_m - fit.model.tissue.surface_m).abs();
     let layers = assumed.tissue.layers.iter().zip(&fit.model.tissue.layers).enumerate();
-    layers.into_iter().any(|(k, (a, b))| {
-        let off = |a: f64, b: f64, tolerance: f64| (b / a - 1.0).abs() > tolerance;
-        off(a.stiffness_n_per_m, b.stiffness_n_per_m, assumed.tolerance[k])
-            || off(a.friction_ns_per_m2, b.friction_ns_per_m2, assumed.tolerance[k])
-            || off(a.thickness_m, b.thickness_m, 2.0 * assumed.thickness_tolerance[k])
-            || a.puncture_n.zip(b.puncture_n).is_some_and(|(a, b)| off(a, b, assumed.tolerance[k]))
-    })
+    moved_m > 2.0 * assumed.surface_tolerance_m
+        || layers.into_iter().any(|(k, (a, b))| {
+            let off = |a: f64, b: f64, tolerance: f64| (b / a - 1.0).abs() > tolerance;
+            off(a.stiffness_n_per_m, b.stiffness_n_per_m, assumed.tolerance[k])
+                || off(a.friction_ns_per_m2, b.friction_ns_per_m2, assumed.tolerance[k])
+                || off(a.thickness_m, b.thickness_m, 2.0 * assumed.thickness_tolerance[k])
+                || a.puncture_n.zip(b.puncture_n).is_some_and(|(a, b)| off(a, b, assumed.tolerance[k]))
+        })
 }
 
 /// The assumed tissue with the numbers that were found, under weak priors. Layers that the needle did not reach keep the assumed

@@ -6,7 +6,15 @@ use stylet_examine::{Case, CaseId, Hide, NamedFile, Severity, Size, World, Wrong
 use stylet_scenario::Scenario;
 
 fn case(severity: Severity, hide: Hide, index: u64) -> (Case, Scenario, Vec<NamedRecording>) {
-    let id = CaseId { world: World::Plain, wrong: Wrong::Guess, severity, hide, size: Size::Strong, seed: 4, index };
+    let id = CaseId {
+        world: World::Plain,
+        wrong: Wrong::Guess,
+        severity,
+        hide,
+        size: Size::Strong,
+        seed: 4,
+        index,
+    };
     let case = make_case(&id).expect("a case of the simulator");
     let scenario = Scenario::parse("guess", &case.question.assumed_ron).expect("its scenario");
     let named = |r: &NamedFile| NamedRecording {
@@ -58,7 +66,10 @@ fn without_a_scenario_the_layers_are_found() {
     let d = diagnose(&found, &recordings, &Options::default(), |_| {}).expect("a diagnosis");
     assert!(d.diagnosis.causes.is_empty(), "{:?}", d.diagnosis.causes);
     for k in 1..truth.layers.len() {
-        let (is_m, was_m) = (d.extended_scenario.tissue.front_m(k), truth.layers[..k].iter().map(|l| l.thickness_m).sum::<f64>());
+        let (is_m, was_m) = (
+            d.extended_scenario.tissue.front_m(k),
+            truth.layers[..k].iter().map(|l| l.thickness_m).sum::<f64>(),
+        );
         assert!((is_m - was_m).abs() < 3e-4, "face {k}: {is_m} m, truth {was_m} m");
     }
     assert!(held(&d.diagnosis, &case) > 0.8, "{:?}", d.diagnosis.base_parameters);

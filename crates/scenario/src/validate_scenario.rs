@@ -32,7 +32,12 @@ fn scenario(s: &Scenario) -> CheckResult {
     effects(s)?;
     check("sample_hz", s.sample_hz, s.sample_hz > 0.0, "it must be positive, for example 200.0")?;
     check("physics_hz", s.physics_hz, s.physics_hz > 0.0, "it must be positive, for example 1000.0")?;
-    check("tolerance", s.tolerance, s.tolerance > 0.0 && s.tolerance <= 1.0, "it must be above 0 and at most 1")?;
+    check(
+        "tolerance",
+        s.tolerance,
+        s.tolerance > 0.0 && s.tolerance <= 1.0,
+        "it must be above 0 and at most 1",
+    )?;
     let within = |x: f64| (0.0..1.0).contains(&x);
     check(
         "thickness_tolerance",

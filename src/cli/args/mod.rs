@@ -13,7 +13,9 @@ pub use benchmark::{
     BenchmarkArgs, BenchmarkCommand, BenchmarkDiagnoseArgs, BenchmarkExportArgs, BenchmarkPlanArgs,
     BenchmarkScoreArgs,
 };
-pub use diagnosis::{DiagnoseArgs, EffectsArgs, IdentifiabilityArgs, IdentifyArgs, PlanArgs, PredictArgs, RefitArg};
+pub use diagnosis::{
+    DiagnoseArgs, EffectsArgs, IdentifiabilityArgs, IdentifyArgs, PlanArgs, PredictArgs, RefitArg,
+};
 pub use inspect::InspectArgs;
 pub use recordings::{ConvertArgs, EnhanceArgs, ListenArgs};
 pub use simulation::{AlgorithmArg, CompareArgs, ReproduceArgs, RunArgs};

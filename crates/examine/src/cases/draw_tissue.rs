@@ -91,7 +91,11 @@ pub fn draw_true_tissue(rng: &mut ChaCha8Rng, assumed: &Tissue, amounts: &Misspe
 }
 
 /// The stack as a scenario guesses it: every number wrong by a factor of its own.
-pub fn draw_guessed_tissue(rng: &mut ChaCha8Rng, assumed: &Tissue, amounts: &MisspecificationAmounts) -> Tissue {
+pub fn draw_guessed_tissue(
+    rng: &mut ChaCha8Rng,
+    assumed: &Tissue,
+    amounts: &MisspecificationAmounts,
+) -> Tissue {
     let mut guess = assumed.clone();
     let mut off = || log_uniform(rng, 1.0 / amounts.guess, amounts.guess);
     for layer in &mut guess.layers {

@@ -140,8 +140,7 @@ fn expected_cause(effect: &Effect, setup: &CaseSetup) -> ExpectedCause {
             it.may_be_silent = true;
         }
         Effect::PositionScale { eps } => {
-            it.may_be_silent =
-                is_guess || eps.abs() + setup.amounts.thickness <= THICKNESS_TOLERANCE;
+            it.may_be_silent = is_guess || eps.abs() + setup.amounts.thickness <= THICKNESS_TOLERANCE;
         }
         Effect::BoundaryShift { layer, shift_m } => {
             let thick = |i: usize| setup.assumed.layers.get(i).map_or(0.0, |l| l.thickness_m);

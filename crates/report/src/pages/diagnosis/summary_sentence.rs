@@ -73,7 +73,10 @@ fn verdict(d: &Diagnosis) -> String {
         Verdict::Parameters => {
             let off = d.findings.iter().filter(|f| f.kind == FindingKind::OutOfTolerance);
             let off: Vec<&str> = off.map(|f| f.message.as_str()).collect();
-            format!("No effect of the library is missing, but numbers of the scenario are wrong: {}.", off.join("; "))
+            format!(
+                "No effect of the library is missing, but numbers of the scenario are wrong: {}.",
+                off.join("; ")
+            )
         }
         Verdict::Named => format!("The simulation lacks {}.", names()),
         Verdict::Ambiguous => {
