@@ -14,8 +14,6 @@ use stylet_scenario::{Motion, Scenario};
 
 /// Relative tolerance of stiffness, friction and puncture force about a value from the data.
 const TOLERANCE: f64 = 1.0;
-/// The same of a thickness: it is found, not assumed ([`Assumptions::is_geometry_guessed`]).
-const THICKNESS_TOLERANCE: f64 = 0.5;
 /// Smallest value of a parameter, as a share of the assumed one: none of them is zero.
 const MIN_SHARE_OF_ASSUMED: f64 = 1e-3;
 /// Gain in nats from which the start from the data is better than the scenario's.
@@ -58,7 +56,7 @@ pub fn scenario_from_recordings(
     let CleanRecordings { recordings: clean, .. } = clean_recordings(recordings);
     let found = FoundTissue::new(&clean, layers).ok_or(DiagnoseError::NoContact)?;
     let mut scenario = Scenario::new(name.to_owned(), found.tissue(), Motion::Recorded);
-    (scenario.tolerance, scenario.thickness_tolerance) = (TOLERANCE, THICKNESS_TOLERANCE);
+    (scenario.tolerance, scenario.thickness_tolerance) = (TOLERANCE, Assumptions::GUESSED_TOLERANCE);
     Ok(scenario)
 }
 
@@ -83,7 +81,7 @@ fn assumptions_from(found: &FoundTissue, assumed: &Assumptions) -> Assumptions {
     out.tissue.surface_m = found.surface_m;
     for (k, layer) in out.tissue.layers.iter_mut().enumerate() {
         out.tolerance[k] = TOLERANCE;
-        out.thickness_tolerance[k] = THICKNESS_TOLERANCE;
+        out.thickness_tolerance[k] = Assumptions::GUESSED_TOLERANCE;
         let Some(l) = found.layers.get(k) else { continue };
         let replace = |x: &mut f64, value: f64| *x = value.max(MIN_SHARE_OF_ASSUMED * *x);
         replace(&mut layer.stiffness_n_per_m, l.stiffness_n_per_m);

@@ -15,13 +15,13 @@ pub struct Assumptions {
     pub surface_tolerance_m: f64,
 }
 
-/// Relative tolerance of a thickness from which it is a guess.
-const GUESSED_TOLERANCE: f64 = 0.5;
-
 impl Assumptions {
+    /// Relative tolerance of a thickness from which it is a guess.
+    pub const GUESSED_TOLERANCE: f64 = 0.5;
+
     /// Whether no thickness is known: where a layer boundary is found then tells nothing about an effect that would move it.
     #[must_use]
     pub fn is_geometry_guessed(&self) -> bool {
-        self.thickness_tolerance.iter().all(|t| *t >= GUESSED_TOLERANCE)
+        self.thickness_tolerance.iter().all(|t| *t >= Self::GUESSED_TOLERANCE)
     }
 }
