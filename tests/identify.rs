@@ -29,7 +29,9 @@ fn the_layers_of_a_simulated_insertion_are_found_without_a_scenario() {
         assert!((is.stiffness_n_per_m / was.stiffness_n_per_m - 1.0).abs() < 0.05, "layer {}", k + 1);
     }
     // The same again replaces its own file, and no other.
-    assert!(stylet(&["identify", "--quiet", "--data", &recording, "--out", &text(&phantom)]).status.success());
+    assert!(
+        stylet(&["identify", "--quiet", "--data", &recording, "--out", &text(&phantom)]).status.success()
+    );
     let other = scratch.file("notes.ron", "mine");
     let output = stylet(&["identify", "--data", &recording, "--out", &text(&other)]);
     assert_eq!(output.status.code(), Some(2));
@@ -42,6 +44,7 @@ fn the_layers_of_a_simulated_insertion_are_found_without_a_scenario() {
     assert!(printed.contains("No scenario was given"), "{printed}");
     // The command of the report repeats it.
     let assumed = format!("{folder}/assumed.ron");
-    let again = stylet(&["diagnose", &assumed, "--data", &recording, "--quiet", "--out", &format!("{folder}-again")]);
+    let again =
+        stylet(&["diagnose", &assumed, "--data", &recording, "--quiet", "--out", &format!("{folder}-again")]);
     assert!(again.status.success(), "{}", stderr_text(&again));
 }

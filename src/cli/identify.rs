@@ -1,7 +1,7 @@
 //! `stylet identify`, and `stylet diagnose` without a scenario: the layers of a phantom from recordings alone.
 
 use crate::cli::args::{DiagnoseArgs, IdentifyArgs};
-use crate::cli::diagnose::summary;
+use crate::cli::diagnosis_summary::summary;
 use crate::cli::exit_codes::Failure;
 use crate::cli::terminal_output::stage_printer;
 use std::fmt::Write as _;

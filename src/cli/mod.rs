@@ -6,6 +6,7 @@ mod compare;
 mod convert;
 mod diagnose;
 mod diagnose_repeats;
+mod diagnosis_summary;
 mod effects;
 mod enhance;
 mod exit_codes;

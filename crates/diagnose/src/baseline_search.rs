@@ -22,7 +22,7 @@ use stylet_identify::score_test::ScoreTest;
 use stylet_tissue::{EffectInfo, Proposal, general_effects};
 
 /// A baseline that reduces the residual by this factor, to the noise, is not put to question by other effects.
-const DOMINANT_FACTOR: f64 = 10.0;
+pub(crate) const DOMINANT_FACTOR: f64 = 10.0;
 /// Rounds in which further steps are looked for in the residual.
 const RESIDUAL_ROUNDS: usize = 3;
 /// Force drops that may be steps of the zero instead of ruptures, tried one at a time.
@@ -181,7 +181,7 @@ fn may_pay(infos: &[&'static EffectInfo], base: &Fit, data: &FitData) -> bool {
     })
 }
 
-fn leaves_noise(f: &Fit, data: &FitData) -> bool {
+pub(crate) fn leaves_noise(f: &Fit, data: &FitData) -> bool {
     let calm = data.with_estimated_noise(&f.residuals.residual_n, NoiseSource::Detrended);
     f.rms_n(data) < MISFIT_FACTOR * calm.noise.sd_n()
 }

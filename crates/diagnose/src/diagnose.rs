@@ -1,8 +1,7 @@
 //! Diagnosis of recordings: which effects the scenario lacks, with intervals, and the improvement on held-out
 //! recordings.
 
-use crate::base_law_fit::{PreparedRecordings, refit_with_random_effects};
-use crate::baseline_search::search_with_baseline;
+use crate::base_law_fit::PreparedRecordings;
 use crate::claims::{self, Context, have_one_motion};
 use crate::competing_effects::{CompetingEffect, find_competing_effects};
 use crate::diagnosis_json::*;
@@ -18,11 +17,10 @@ use crate::identifiability::{advice, not_identifiable};
 use crate::input_checks::{
     CleanRecordings, NamedRecording, check_recordings, clean_recordings, force_outlier_notes,
 };
-use crate::measured_start::fit_base_law_from_any_start;
+use crate::measured_start::search_from_any_start;
 use crate::motion_period::common_motion_period_s;
 use crate::negligible_effects::{Negligible, negligible_effects};
 use crate::partial_model::partial_model;
-use crate::random_effect_selection::select_random_effects;
 use crate::selection_state::{Search, SearchStage};
 use crate::sensor_artefact_causes::sensor_artefact_causes;
 use crate::verdict::{Assessment, assess_search, is_kept, move_negligible};
@@ -87,10 +85,8 @@ pub fn diagnose(
         blocks,
         raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD,
     );
-    let (prepared, base, data) = fit_base_law_from_any_start(prepared, &clean).ok_or(DiagnoseError::NoFit)?;
-    let (base, data) = select_random_effects(base, data);
-    let (base, data) = refit_with_random_effects(&prepared, base, data);
-    let (mut search, prepared) = search_with_baseline(&prepared, base, data, &mut progress);
+    let (mut search, prepared) =
+        search_from_any_start(prepared, &clean, &mut progress).ok_or(DiagnoseError::NoFit)?;
     let mut competing = find_competing_effects(&mut search);
     progress("assessing the residual");
     let mut assessment = assess_search(&mut search, &competing);

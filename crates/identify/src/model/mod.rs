@@ -26,6 +26,7 @@ pub use compiled_model::CompiledModel;
 pub use effect_term::EffectTerm;
 pub use free_parameters::FreeParameters;
 pub use parameter::{Parameter, ParameterRole};
+pub use parameter_bounds::MAX_TOLERANCES_WIDE;
 pub use random_effects::{
     DayParameters, MAX_VARYING_PARAMETERS, RecordingParameters, Scatter, TiedParameter,
 };

@@ -8,7 +8,7 @@ const MIN_SHARE_OF_ASSUMED: f64 = 0.02;
 /// Bounds of surface and thicknesses, in tolerances.
 const MAX_TOLERANCES: f64 = 2.0;
 /// Bounds of thicknesses with [`FreeParameters::wide_thickness`](super::FreeParameters), in tolerances.
-const MAX_TOLERANCES_WIDE: f64 = 5.0;
+pub const MAX_TOLERANCES_WIDE: f64 = 5.0;
 
 /// Finite difference in N for the size of a step of the zero, in which the force is linear.
 const ZERO_STEP_DIFFERENCE_N: f64 = 1e-3;

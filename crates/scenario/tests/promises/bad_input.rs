@@ -169,9 +169,9 @@ fn values_out_of_range_are_refused_with_field_value_and_range() {
             "positive number of N",
         ), // negative puncture force
         ("sample_hz: 200.0", "sample_hz: ⟦0.0", "sample_hz", "is 0;", "positive, for example 200.0"), // sample rate zero
-        ("tolerance: 0.3", "tolerance: ⟦0.0", "tolerance", "is 0;", "between 0 and 1"), // tolerance of zero and of one
-        ("tolerance: 0.3", "tolerance: ⟦1.0", "tolerance", "is 1;", "between 0 and 1"), // tolerance of zero and of one
-        ("tolerance: 0.3", "tolerance: ⟦30", "tolerance", "is 30;", "between 0 and 1"), // tolerance of zero and of one
+        ("tolerance: 0.3", "tolerance: ⟦0.0", "tolerance", "is 0;", "above 0 and at most 1"), // tolerance of zero and above one
+        ("tolerance: 0.3", "tolerance: ⟦1.5", "tolerance", "is 1.5;", "above 0 and at most 1"), // tolerance of zero and above one
+        ("tolerance: 0.3", "tolerance: ⟦30", "tolerance", "is 30;", "above 0 and at most 1"), // tolerance of zero and above one
         ("ar1: 0.0", "ar1: ⟦1.0", "sensor.ar1", "is 1;", "between -1 and 1"), // noise that never forgets
         ("hz: 40.0", "hz: ⟦0.0", "enhance.reset.hz", "is 0;", "positive number of Hz"), // reset at zero hertz
         (
