@@ -61,6 +61,12 @@ fn run(
     let Some(first) = args.data.first() else {
         return Err(Failure::Check("no recordings: name them with --data A.csv B.csv".to_owned()));
     };
+    if let Some(scenario) = args.data.iter().find(|path| path.extension().is_some_and(|e| e == "ron")) {
+        return Err(Failure::Check(format!(
+            "{} is no recording; a scenario goes before --data: stylet diagnose {0} --data A.csv B.csv",
+            scenario.display()
+        )));
+    }
     args.limits.check(first, &resource_estimate::estimate_diagnose(&args.data), args.results.quiet)?;
     let folder = args.results.output_folder(first, "-phantom");
     let inputs = DiagnosisInputs {

@@ -8,7 +8,8 @@ pub enum DiagnoseError {
     NoRecording,
     /// No layers to start from.
     #[error(
-        "no recording shows a contact, so there are no layers to start from; look at `stylet enhance`'s report, or name a scenario"
+        "no recording begins in air and then meets tissue, so there are no layers to start from; look at `stylet enhance`'s report, or name a \
+         scenario"
     )]
     NoContact,
     /// More layers than a diagnosis can distinguish.

@@ -1,7 +1,7 @@
 //! Layers of a tissue from the recordings alone, as the online algorithm finds them: no scenario is needed.
 
 use rayon::prelude::*;
-use stylet_core::EnhanceConfig;
+use stylet_core::{EnhanceConfig, Sample};
 use stylet_record::Recording;
 use stylet_score::{FoundLayer, Trace, found_layers};
 use stylet_stats::median_of;
@@ -37,12 +37,16 @@ pub(crate) struct MedianLayer {
 }
 
 impl FoundTissue {
-    /// The tissue with `count` layers, by default with the most frequent number of them. `None` without a contact.
+    /// The tissue with `count` layers, by default with the most frequent number of them. `None` without a contact: the needle
+    /// touches nothing, or begins in the tissue.
     pub(crate) fn new(recordings: &[Recording], count: Option<usize>) -> Option<Self> {
         let config = EnhanceConfig::default();
         let layers = |r: &Recording| {
-            let trace = Trace::run(r, &r.force_n, &config, 0.0, |_, _| {});
-            Some(without_exit(found_layers(&trace, &r.position_m)?, r))
+            let trace = Trace::run_measured(r, &r.force_n, &config, 0.0, None::<fn(&Sample, usize) -> f64>);
+            if trace.contact.is_loaded_unexpectedly() {
+                return None;
+            }
+            Some(without_exit(found_layers(&trace, &r.position_m)?, r)).filter(|found| !found.is_empty())
         };
         let all: Vec<Vec<FoundLayer>> = recordings.par_iter().filter_map(layers).collect();
         let has = |n: &usize| all.iter().any(|found| found.len() == *n);
@@ -84,11 +88,11 @@ impl FoundTissue {
     }
 }
 
-/// The layers without a last one in which no elastic force acts: the tip has left the tissue.
+/// The layers without a last one in which no elastic force acts: the tip has left the tissue, or nothing elastic was touched.
 fn without_exit(mut found: Vec<FoundLayer>, recording: &Recording) -> Vec<FoundLayer> {
     let peak_n = recording.force_n.iter().copied().fold(0.0, f64::max);
     let leaves = |l: &FoundLayer| l.stiffness_n_per_m * l.thickness_m < MIN_FORCE_SHARE * peak_n;
-    if found.len() > 1 && found.last().is_some_and(leaves) {
+    if found.last().is_some_and(leaves) {
         found.pop();
     }
     found

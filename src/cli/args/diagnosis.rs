@@ -60,7 +60,8 @@ impl DiagnoseArgs {
   stylet identify --data log.csv --columns map.ron --layers 3
 
 Writes phantom.ron (layers with thickness, stiffness, friction and puncture force, and the effects found
-in the recordings), report.html and diagnosis.json. Recordings with different motions determine more than
+in the recordings), report.html and diagnosis.json into a folder; --out FILE.ron writes the phantom there
+and the rest into the default folder. Recordings with different motions determine more than
 repeats of one: at one constant speed stiffness and friction cannot be told apart.")]
 pub struct IdentifyArgs {
     /// Recordings (CSV with header).
