@@ -44,7 +44,7 @@ mod input_checks;
 mod local_minima;
 mod mains_frequency;
 mod measured_start;
-mod model_comparison;
+pub mod model_comparison;
 mod model_pruning;
 mod motion_period;
 pub mod negligible_effects;
