@@ -48,6 +48,7 @@ export class ExplainView {
 
   async begin(name, request) {
     await this.app.attempt(async () => {
+      if (name === "diagnose") this.of = JSON.stringify(this.app.state.phantom);
       this.app.state.job = await call(name, request);
       this.paintJob(this.app.state.job);
       this.paintStart();
@@ -93,15 +94,18 @@ export class ExplainView {
     if (!found) {
       fill(this.result, h("div", { class: "hero" }, h("h2", {}, "Compare the phantom with recordings"),
         h("p", {}, "The diagnosis fits the phantom's layers to the recordings, searches the library of effects for what the phantom lacks, and says how much better the extended phantom predicts."),
-        app.state.files.length > 0 && h("p", { class: "soft" }, "Start from the layers that were found (view Look), or draw your own (view Phantom); values within about 30 % are good enough.")));
+        app.state.files.length > 0 && h("p", { class: "soft" }, "Start from the layers that were found (view Look), or draw your own (view Phantom).")));
       fill(this.report);
       return;
     }
     const switches = found.causes.map(cause => h("section", { class: "card cause" },
       h("label", {}, h("input", { type: "checkbox", checked: !this.off.has(cause.id), onchange: event => { if (event.target.checked) this.off.delete(cause.id); else this.off.add(cause.id); app.attempt(() => this.paintCurves()); } }), " ", h("strong", {}, cause.title)),
       cause.lines.map(line => h("p", {}, line))));
+    const old = this.of && this.of !== JSON.stringify(app.state.phantom);
     fill(this.result,
-      h("div", { class: `hero verdict ${found.verdict}` }, h("h2", {}, found.sentence), h("p", {}, found.gain)),
+      h("div", { class: `hero verdict ${old ? "old" : found.verdict}` },
+        old && h("p", {}, "The phantom has changed since this diagnosis. Press Diagnose for the one that is drawn now."),
+        h("h2", {}, found.sentence), h("p", {}, `${found.gain} Diagnosed: ${found.files.join(", ")}.`)),
       h("div", { class: "causes" }, switches),
       h("div", { class: "row" },
         button("Keep this model as the phantom", () => app.attempt(async () => {
