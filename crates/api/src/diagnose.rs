@@ -81,8 +81,16 @@ pub fn diagnose(
     recordings: &[NamedRecording],
     progress: impl FnMut(&str),
 ) -> Result<DiagnosisReport, Error> {
-    let recordings = usable_recordings(recordings)?;
-    let details = stylet_diagnose::diagnose(assumed, &recordings, &Options::default(), progress)?;
+    diagnose_usable(assumed, &usable_recordings(recordings)?, progress)
+}
+
+/// As [`diagnose`], for recordings that are checked and not too long.
+fn diagnose_usable(
+    assumed: &Scenario,
+    recordings: &[NamedRecording],
+    progress: impl FnMut(&str),
+) -> Result<DiagnosisReport, Error> {
+    let details = stylet_diagnose::diagnose(assumed, recordings, &Options::default(), progress)?;
     Ok(DiagnosisReport {
         diagnosis: details.diagnosis.clone(),
         extended: details.extended_scenario.clone(),
@@ -102,9 +110,9 @@ pub fn identify(
     mut progress: impl FnMut(&str),
 ) -> Result<(Scenario, DiagnosisReport), Error> {
     progress("looking for layers");
-    let usable = usable_recordings(recordings)?;
-    let scenario = stylet_diagnose::scenario_from_recordings(name, &usable, layers)?;
-    let mut report = diagnose(&scenario, recordings, progress)?;
+    let recordings = usable_recordings(recordings)?;
+    let scenario = stylet_diagnose::scenario_from_recordings(name, &recordings, layers)?;
+    let mut report = diagnose_usable(&scenario, &recordings, progress)?;
     // The numbers are known now.
     let usual = Scenario::new(String::new(), scenario.tissue.clone(), scenario.motion.clone());
     report.extended.tolerance = usual.tolerance;

@@ -51,19 +51,19 @@ impl FoundTissue {
         let all: Vec<Vec<FoundLayer>> = recordings.par_iter().filter_map(layers).collect();
         let has = |n: &usize| all.iter().any(|found| found.len() == *n);
         let count = count.filter(has).or_else(|| most_frequent(all.iter().map(Vec::len)))?;
-        let alike: Vec<&Vec<FoundLayer>> = all.iter().filter(|found| found.len() == count).collect();
-        let surface_m = median_of(alike.iter().map(|found| found[0].front_m));
+        let chosen: Vec<&Vec<FoundLayer>> = all.iter().filter(|found| found.len() == count).collect();
+        let surface_m = median_of(chosen.iter().map(|found| found[0].front_m));
         let layer = |k: usize| {
             let median =
-                |value: fn(&FoundLayer) -> f64| median_of(alike.iter().map(|found| value(&found[k])));
-            let ruptures: Vec<f64> = alike.iter().filter_map(|found| found[k].rupture_force_n()).collect();
-            let by_force = alike.iter().filter(|found| found[k].is_ruptured_by_force()).count();
+                |value: fn(&FoundLayer) -> f64| median_of(chosen.iter().map(|found| value(&found[k])));
+            let ruptures: Vec<f64> = chosen.iter().filter_map(|found| found[k].rupture_force_n()).collect();
+            let by_force = chosen.iter().filter(|found| found[k].is_ruptured_by_force()).count();
             MedianLayer {
                 stiffness_n_per_m: median(|l| l.stiffness_n_per_m),
                 friction_ns_per_m2: median(|l| l.friction_ns_per_m2),
                 thickness_m: median(|l| l.thickness_m).max(MIN_THICKNESS_M),
                 rupture_n: (!ruptures.is_empty()).then(|| median_of(ruptures)),
-                by_force: 2 * by_force > alike.len(),
+                by_force: 2 * by_force > chosen.len(),
             }
         };
         Some(Self { surface_m, layers: (0..count).map(layer).collect() })

@@ -62,7 +62,7 @@ impl DiagnoseArgs {
 Writes phantom.ron (layers with thickness, stiffness, friction and puncture force, and the effects found
 in the recordings), report.html and diagnosis.json into a folder; --out FILE.ron writes the phantom there
 and the rest into the default folder. Recordings with different motions determine more than
-repeats of one: at one constant speed stiffness and friction cannot be told apart.")]
+repeats of one: at one constant speed stiffness and friction cannot be separated.")]
 pub struct IdentifyArgs {
     /// Recordings (CSV with header).
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
