@@ -133,6 +133,7 @@ function bindDrop() {
 }
 
 async function start() {
+  const asking = Promise.all([call("library"), call("state")]);
   app.views = {
     open: new OpenView(by("view-open"), app), look: new LookView(by("view-look"), app),
     phantom: new PhantomView(by("view-phantom"), app), explain: new ExplainView(by("view-explain"), app),
@@ -151,7 +152,7 @@ async function start() {
   try { kept = localStorage.getItem("theme"); } catch { /* as above */ }
   theme(["auto", "light", "dark"].includes(kept) ? kept : "auto");
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
-  const [library, state] = await Promise.all([call("library"), call("state")]), asked = location.hash.slice(1);
+  const [library, state] = await asking, asked = location.hash.slice(1);
   app.library = library;
   await app.show(app.views[asked] ? asked : state.diagnosis ? "explain" : state.files.length ? "look" : "phantom", state);
   document.documentElement.dataset.ready = "true";

@@ -28,8 +28,9 @@ export class PhantomView {
 
   async update() {
     if (this.along && !this.app.state.files.includes(this.along)) this.along = null;
-    const preview = await this.app.attempt(() => call("preview", { file: this.along }));
+    const asking = this.app.attempt(() => call("preview", { file: this.along }));
     this.panel(this.app.state.phantom, true);
+    const preview = await asking;
     if (preview) this.draw(preview);
   }
 
