@@ -127,6 +127,14 @@ def drop(page, path):
     page.set_input_files("#chooser", str(path))
 
 
+def find_browser():
+    return os.environ.get("CHROME") or shutil.which("chromium") or shutil.which("google-chrome")
+
+
+def launch(playwright):
+    return playwright.chromium.launch(executable_path=find_browser(), args=["--no-sandbox", "--disable-gpu"])
+
+
 def wait_drawn(page, view, timeout=20_000):
     page.wait_for_function("v => document.getElementById('view-' + v).dataset.drawn", arg=view, timeout=timeout)
 
@@ -138,8 +146,7 @@ def main():
     parser.add_argument("--picture-for-docs", type=pathlib.Path)
     parser.add_argument("--long", action="store_true", help="20 diagnoses, and their memory")
     options = parser.parse_args()
-    browser_path = os.environ.get("CHROME") or shutil.which("chromium") or shutil.which("google-chrome")
-    if not browser_path:
+    if not find_browser():
         print("skipped: no browser")
         return 77
     stylet = str(pathlib.Path(options.stylet).resolve())
@@ -150,7 +157,7 @@ def main():
     faults = []
     try:
         with sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path=browser_path, args=["--no-sandbox", "--disable-gpu"])
+            browser = launch(playwright)
             context = browser.new_context(viewport={"width": 1600, "height": 1000})
             page = context.new_page()
             watch(page, studio.address, faults)
