@@ -11,7 +11,8 @@ use stylet_tissue::{AnyEffect, CoulombFriction, ForceDrift};
 
 /// The assumed scenario and the recordings of a case.
 fn inputs(question: &Question) -> Result<(Scenario, Vec<NamedRecording>), String> {
-    let scenario = Scenario::parse("assumed.ron", &question.assumed_ron).map_err(|e| e.to_string())?;
+    let ron = question.assumed_ron.as_deref().unwrap_or_default();
+    let scenario = Scenario::parse("assumed.ron", ron).map_err(|e| e.to_string())?;
     let recordings = question.recordings.iter();
     let recordings = recordings.map(|r| NamedRecording {
         name: r.name.clone(),

@@ -19,6 +19,10 @@ pub struct DiagnosisReport {
 }
 
 impl DiagnosisReport {
+    fn new(details: DiagnosisResult) -> Self {
+        Self { diagnosis: details.diagnosis.clone(), extended: details.extended_scenario.clone(), details }
+    }
+
     /// `diagnosis.json`.
     ///
     /// # Errors
@@ -81,21 +85,8 @@ pub fn diagnose(
     recordings: &[NamedRecording],
     progress: impl FnMut(&str),
 ) -> Result<DiagnosisReport, Error> {
-    diagnose_usable(assumed, &usable_recordings(recordings)?, progress)
-}
-
-/// As [`diagnose`], for recordings that are checked and not too long.
-fn diagnose_usable(
-    assumed: &Scenario,
-    recordings: &[NamedRecording],
-    progress: impl FnMut(&str),
-) -> Result<DiagnosisReport, Error> {
-    let details = stylet_diagnose::diagnose(assumed, recordings, &Options::default(), progress)?;
-    Ok(DiagnosisReport {
-        diagnosis: details.diagnosis.clone(),
-        extended: details.extended_scenario.clone(),
-        details,
-    })
+    let recordings = usable_recordings(recordings)?;
+    Ok(DiagnosisReport::new(stylet_diagnose::diagnose(assumed, &recordings, &Options::default(), progress)?))
 }
 
 /// Finds the layers that recordings show, `layers` of them or as many as there are, and diagnoses what is left: the scenario that it
@@ -107,12 +98,12 @@ pub fn identify(
     name: &str,
     recordings: &[NamedRecording],
     layers: Option<usize>,
-    mut progress: impl FnMut(&str),
+    progress: impl FnMut(&str),
 ) -> Result<(Scenario, DiagnosisReport), Error> {
-    progress("looking for layers");
     let recordings = usable_recordings(recordings)?;
-    let scenario = stylet_diagnose::scenario_from_recordings(name, &recordings, layers)?;
-    let mut report = diagnose_usable(&scenario, &recordings, progress)?;
+    let (scenario, details) =
+        stylet_diagnose::identify(name, &recordings, layers, &Options::default(), progress)?;
+    let mut report = DiagnosisReport::new(details);
     // The numbers are known now.
     let usual = Scenario::new(String::new(), scenario.tissue.clone(), scenario.motion.clone());
     report.extended.tolerance = usual.tolerance;

@@ -150,7 +150,7 @@ fn disturbed_case(kind: &str, seed: u64, index: u64, recordings: usize) -> Resul
         )?;
         data.push(NamedRecording { name: file.name.clone(), recording, notes: Vec::new() });
     }
-    Ok((Scenario::parse("assumed.ron", &case.question.assumed_ron)?, data))
+    Ok((Scenario::parse("assumed.ron", &case.question.assumed_ron.unwrap_or_default())?, data))
 }
 
 /// Triangles or sines into one elastic layer, with or without a rate-independent hysteresis.

@@ -12,6 +12,16 @@ pub enum DiagnoseError {
          scenario"
     )]
     NoContact,
+    /// Fewer layers in the recordings than asked for.
+    #[error(
+        "the recordings show {found} layer(s), not {asked}; leave the number away, or describe the layers in a scenario"
+    )]
+    FewerLayers {
+        /// Layers asked for.
+        asked: usize,
+        /// Layers found.
+        found: usize,
+    },
     /// More layers than a diagnosis can distinguish.
     #[error(
         "the scenario has {layers} layers; a diagnosis distinguishes up to {most}: merge neighbouring layers of the same tissue"

@@ -11,7 +11,7 @@ use stylet_tissue::{Layer, Tissue};
 const MIN_THICKNESS_M: f64 = 5e-4;
 /// Elastic force of the last layer at the deepest point, relative to the largest force, below which the tip has left the
 /// tissue.
-const MIN_FORCE_SHARE: f64 = 0.01;
+pub(crate) const MIN_FORCE_SHARE: f64 = 0.01;
 
 /// Layers that the online algorithm found in several recordings: medians over those with the same number of layers.
 pub(crate) struct FoundTissue {
@@ -37,8 +37,8 @@ pub(crate) struct MedianLayer {
 }
 
 impl FoundTissue {
-    /// The tissue with `count` layers, by default with the most frequent number of them. `None` without a contact: the needle
-    /// touches nothing, or begins in the tissue.
+    /// The tissue with the most frequent number of layers, or with `count` where any recording shows as many or more. `None` without
+    /// a contact: the needle touches nothing, or begins in the tissue.
     pub(crate) fn new(recordings: &[Recording], count: Option<usize>) -> Option<Self> {
         let config = EnhanceConfig::default();
         let layers = |r: &Recording| {
@@ -49,6 +49,12 @@ impl FoundTissue {
             Some(without_exit(found_layers(&trace, &r.position_m)?, r)).filter(|found| !found.is_empty())
         };
         let all: Vec<Vec<FoundLayer>> = recordings.par_iter().filter_map(layers).collect();
+        let all: Vec<Vec<FoundLayer>> = match count {
+            Some(count) if all.iter().any(|found| found.len() >= count) => {
+                all.into_iter().map(|found| with_at_most(count, found)).collect()
+            }
+            _ => all,
+        };
         let has = |n: &usize| all.iter().any(|found| found.len() == *n);
         let count = count.filter(has).or_else(|| most_frequent(all.iter().map(Vec::len)))?;
         let chosen: Vec<&Vec<FoundLayer>> = all.iter().filter(|found| found.len() == count).collect();
@@ -94,6 +100,18 @@ fn without_exit(mut found: Vec<FoundLayer>, recording: &Recording) -> Vec<FoundL
     let leaves = |l: &FoundLayer| l.stiffness_n_per_m * l.thickness_m < MIN_FORCE_SHARE * peak_n;
     if found.last().is_some_and(leaves) {
         found.pop();
+    }
+    found
+}
+
+/// The first `count` layers; the last of them continues to the deepest position.
+fn with_at_most(count: usize, mut found: Vec<FoundLayer>) -> Vec<FoundLayer> {
+    if found.len() > count {
+        let beyond_m: f64 = found.drain(count..).map(|l| l.thickness_m).sum();
+        if let Some(last) = found.last_mut() {
+            last.thickness_m += beyond_m;
+            last.rupture_m = None;
+        }
     }
     found
 }

@@ -40,6 +40,7 @@ mod general_forms;
 pub mod geometry_selection;
 pub mod held_out;
 mod identifiability;
+mod identify;
 mod input_checks;
 mod local_minima;
 mod mains_frequency;
@@ -71,8 +72,8 @@ pub use competing_effects::EQUIVALENCE_NATS;
 pub use diagnose::{DiagnosisResult, Options, REASON_IMITATES_UNMODELLED, assumptions_of, diagnose};
 pub use diagnosis_json::{Diagnosis, Verdict};
 pub use error::DiagnoseError;
+pub use identify::{identify, scenario_from_recordings};
 pub use input_checks::NamedRecording;
-pub use measured_start::scenario_from_recordings;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

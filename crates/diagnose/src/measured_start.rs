@@ -1,10 +1,8 @@
-//! Starting values from the data alone, for scenarios whose numbers are a rough guess, and for none.
+//! Starting values from the data, for scenarios whose numbers are a rough guess.
 
 use crate::base_law_fit::{PreparedRecordings, fit_base_law, refit_with_random_effects};
-use crate::baseline_search::{DOMINANT_FACTOR, leaves_noise, search_with_baseline};
-use crate::error::DiagnoseError;
+use crate::baseline_search::{leaves_noise, search_with_baseline};
 use crate::found_tissue::FoundTissue;
-use crate::input_checks::{CleanRecordings, NamedRecording, check_length, clean_recordings};
 use crate::random_effect_selection::select_random_effects;
 use crate::selection_state::Search;
 use std::sync::Arc;
@@ -12,18 +10,19 @@ use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{Assumptions, MAX_TOLERANCES_WIDE};
 use stylet_record::Recording;
-use stylet_scenario::{Motion, Scenario};
 
 /// Relative tolerance of stiffness, friction and puncture force about a value from the data.
-const TOLERANCE: f64 = 1.0;
+pub(crate) const TOLERANCE: f64 = 1.0;
 /// Smallest value of a parameter, as a share of the assumed one: none of them is zero.
 const MIN_SHARE_OF_ASSUMED: f64 = 1e-3;
-/// A search that leaves a residual smaller by this factor is better, even if neither explains the force.
+/// A fit that leaves a residual smaller by this factor is better, even if it does not explain the force.
 const BETTER_FACTOR: f64 = 2.0;
 
-/// The search for effects from the assumed numbers. Where that leaves more than noise and numbers from the data are outside the
-/// tolerance of the assumed ones, the search starts from those: at once where they need no effect or leave far less, else where
-/// the first search does not explain the force and the second does, or does far better. `None` when the model cannot be replayed.
+/// The search for effects from the assumed numbers, or from those in the data.
+///
+/// Numbers in the data are the start where the assumed ones leave more than noise and differ by more than their tolerance. That search
+/// stands if it explains the force and its numbers are still outside the tolerance. Else the search from the assumed numbers decides.
+/// `None` when the model cannot be replayed.
 pub(crate) fn search_from_any_start(
     prepared: PreparedRecordings,
     recordings: &[Recording],
@@ -34,20 +33,18 @@ pub(crate) fn search_from_any_start(
     let Some((measured, fit, data_of_fit)) = measured else {
         return Some(search(&prepared, base, data, progress));
     };
-    let dominant = base.rms_n(&data) > DOMINANT_FACTOR * fit.rms_n(&data_of_fit);
-    if dominant || leaves_noise(&fit, &data_of_fit) {
-        return Some(search(&measured, fit, data_of_fit, progress));
-    }
-    let assumed = search(&prepared, base, data, progress);
     let explains = |found: &Search| found.leaves_noise(&found.best);
-    if explains(&assumed.0) {
-        return Some(assumed);
+    let from_data = search(&measured, fit, data_of_fit, progress);
+    let data_explains = explains(&from_data.0);
+    if data_explains && is_out_of_tolerance(&prepared.assumed, &from_data.0.best) {
+        return Some(from_data);
     }
-    progress("starting again from the layers in the data");
-    let other = search(&measured, fit, data_of_fit, progress);
+    progress("starting again from the assumed numbers");
+    let from_assumed = search(&prepared, base, data, progress);
     let rms_n = |found: &Search| found.best.rms_n(&found.data);
-    let better = explains(&other.0) || rms_n(&assumed.0) > BETTER_FACTOR * rms_n(&other.0);
-    Some(if better { other } else { assumed })
+    let is_better = explains(&from_assumed.0)
+        || (!data_explains && rms_n(&from_data.0) < BETTER_FACTOR * rms_n(&from_assumed.0));
+    Some(if is_better { from_assumed } else { from_data })
 }
 
 /// The search from a fit of the base law, with the recordings it was fitted to.
@@ -72,24 +69,6 @@ fn fit_from_data(
     let measured = PreparedRecordings { assumed, ..prepared.clone() };
     let (fit, data) = fit_base_law(&measured)?;
     is_out_of_tolerance(&prepared.assumed, &fit).then_some((measured, fit, data))
-}
-
-/// A scenario with the layers that the recordings show, `layers` of them or as many as there are, and weak priors about their
-/// numbers: what [`diagnose`](crate::diagnose()) starts from without a scenario.
-///
-/// # Errors
-/// [`DiagnoseError`] when a recording is too short, or none has a contact.
-pub fn scenario_from_recordings(
-    name: &str,
-    recordings: &[NamedRecording],
-    layers: Option<usize>,
-) -> Result<Scenario, DiagnoseError> {
-    check_length(recordings)?;
-    let CleanRecordings { recordings: clean, .. } = clean_recordings(recordings);
-    let found = FoundTissue::new(&clean, layers).ok_or(DiagnoseError::NoContact)?;
-    let mut scenario = Scenario::new(name.to_owned(), found.tissue(), Motion::Recorded);
-    (scenario.tolerance, scenario.thickness_tolerance) = (TOLERANCE, Assumptions::GUESSED_TOLERANCE);
-    Ok(scenario)
 }
 
 /// Whether a fitted surface, stiffness, friction or puncture force is outside the tolerance of the assumed one, or a thickness outside

@@ -10,7 +10,8 @@ use stylet_scenario::Scenario;
 fn case() -> (Scenario, Vec<Recording>) {
     let plan = Plan { hide: vec![Hide::Clean], cases: 1, seed: 3, ..Plan::default() };
     let question = stylet_examine::make_case(&plan.cases()[0]).expect("a case").question;
-    let assumed = Scenario::parse(&question.name, &question.assumed_ron).expect("a scenario");
+    let assumed = Scenario::parse(&question.name, question.assumed_ron.as_deref().expect("a scenario"))
+        .expect("a scenario");
     (assumed, question.recordings.into_iter().map(|named| named.recording).collect())
 }
 

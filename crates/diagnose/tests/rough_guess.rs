@@ -16,7 +16,8 @@ fn case(severity: Severity, hide: Hide, index: u64) -> (Case, Scenario, Vec<Name
         index,
     };
     let case = make_case(&id).expect("a case of the simulator");
-    let scenario = Scenario::parse("guess", &case.question.assumed_ron).expect("its scenario");
+    let scenario = Scenario::parse("guess", case.question.assumed_ron.as_deref().expect("a scenario"))
+        .expect("its scenario");
     let named = |r: &NamedFile| NamedRecording {
         name: r.name.clone(),
         recording: r.recording.clone(),

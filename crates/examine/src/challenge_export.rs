@@ -103,7 +103,9 @@ fn one(folder: &Path, id: &CaseId) -> Result<(), ChallengeError> {
     let failed = |why| ChallengeError::File { path: folder.display().to_string(), why };
     std::fs::create_dir_all(folder).map_err(failed)?;
     let case = make_case(id)?;
-    std::fs::write(folder.join("assumed.ron"), &case.question.assumed_ron).map_err(failed)?;
+    if let Some(ron) = &case.question.assumed_ron {
+        std::fs::write(folder.join("assumed.ron"), ron).map_err(failed)?;
+    }
     for named in &case.question.recordings {
         let file = std::fs::File::create(folder.join(&named.name)).map_err(failed)?;
         stylet_record::write_csv(&named.recording, None, &[], file)?;

@@ -9,24 +9,33 @@ use stylet_scenario::Scenario;
 /// # Errors
 /// The reason why there is no answer.
 pub fn answer_question(question: &Question) -> Result<Answer, String> {
-    let (scenario, recordings) = scenario_and_recordings(question)?;
-    let result = stylet_diagnose::diagnose(&scenario, &recordings, &Options::default(), |_| {})
-        .map_err(|e| e.to_string())?;
+    let (options, recordings) = (Options::default(), named_recordings(question));
+    let result = if question.assumed_ron.is_some() {
+        stylet_diagnose::diagnose(&assumed_scenario(question)?, &recordings, &options, |_| {})
+    } else {
+        stylet_diagnose::identify(&question.name, &recordings, None, &options, |_| {}).map(|found| found.1)
+    };
     // Through the JSON file, so that the scored answer is what a user gets.
-    let json = serde_json::to_string(&result.diagnosis).map_err(|e| e.to_string())?;
-    Answer::from_json(&json).map_err(|e| e.to_string())
+    let json = serde_json::to_string(&result.map_err(|e| e.to_string())?.diagnosis);
+    Answer::from_json(&json.map_err(|e| e.to_string())?).map_err(|e| e.to_string())
 }
 
-/// The assumed scenario and the recordings of a question.
+/// The assumed scenario of a question that has one.
 ///
 /// # Errors
-/// What is wrong with the scenario.
-pub fn scenario_and_recordings(question: &Question) -> Result<(Scenario, Vec<NamedRecording>), String> {
-    let scenario = Scenario::parse(&question.name, &question.assumed_ron).map_err(|e| e.to_string())?;
-    let recordings = question
-        .recordings
-        .iter()
-        .map(|r| NamedRecording { name: r.name.clone(), recording: r.recording.clone(), notes: Vec::new() })
-        .collect();
-    Ok((scenario, recordings))
+/// What is wrong with it.
+pub fn assumed_scenario(question: &Question) -> Result<Scenario, String> {
+    let ron = question.assumed_ron.as_deref().unwrap_or_default();
+    Scenario::parse(&question.name, ron).map_err(|e| e.to_string())
+}
+
+/// The recordings of a question.
+#[must_use]
+pub fn named_recordings(question: &Question) -> Vec<NamedRecording> {
+    let named = |r: &stylet_examine::NamedFile| NamedRecording {
+        name: r.name.clone(),
+        recording: r.recording.clone(),
+        notes: Vec::new(),
+    };
+    question.recordings.iter().map(named).collect()
 }

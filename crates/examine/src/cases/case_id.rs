@@ -74,6 +74,7 @@ words! {
         Five = "five": "thickness, surface, coefficients, encoder and growing noise at once, at half the size",
         Geometry = "geometry": "thickness and surface off at once, each as much as in its own row",
         Guess = "guess": "every layer's thickness, K, b, F assumed off by a factor of up to 1.6, 3, 10",
+        NoScenario = "no_scenario": "no assumed layers at all: of one or two, two to four, five layers",
     }
 }
 

@@ -33,8 +33,8 @@ pub struct NamedFile {
 pub struct Question {
     /// Name of the case; it reveals nothing about the truth.
     pub name: String,
-    /// The assumed scenario (RON, docs/reference/files.md).
-    pub assumed_ron: String,
+    /// The assumed scenario (RON, docs/reference/files.md); `None` when there is none.
+    pub assumed_ron: Option<String>,
     /// The measured recordings.
     pub recordings: Vec<NamedFile>,
 }
@@ -68,7 +68,8 @@ pub fn make_case(id: &CaseId) -> Result<Case, stylet_record::RecordError> {
         there.push(insertion);
     }
     let name = format!("case {:016x}", id.case_seed());
-    let assumed_ron = draw_tissue::scenario_ron(&name, &setup.assumed, setup.amounts.rate_hz);
+    let scenario = || draw_tissue::scenario_ron(&name, &setup.assumed, setup.amounts.rate_hz);
+    let assumed_ron = setup.amounts.has_scenario.then(scenario);
     Ok(Case { id: *id, question: Question { name, assumed_ron, recordings }, setup, there })
 }
 

@@ -28,6 +28,8 @@ pub struct MisspecificationAmounts {
     pub coefficients: f64,
     /// Largest factor by which the scenario's thickness, K, b, F are too large or too small.
     pub guess: f64,
+    /// Whether there is a scenario.
+    pub has_scenario: bool,
     /// Standard deviation of the encoder's noise in m.
     pub encoder_m: f64,
     /// Step of the encoder in m.
@@ -67,6 +69,12 @@ pub struct MisspecificationAmounts {
 }
 
 impl MisspecificationAmounts {
+    /// Whether nobody knows the layers to the usual tolerance.
+    #[must_use]
+    pub fn is_tissue_guessed(&self) -> bool {
+        self.guess > 1.0 || !self.has_scenario
+    }
+
     /// By how much the force is late in s.
     #[must_use]
     pub fn delay_s(&self) -> f64 {
@@ -82,6 +90,7 @@ impl MisspecificationAmounts {
             surface_each_m: 0.0,
             coefficients: 0.05,
             guess: 1.0,
+            has_scenario: true,
             encoder_m: 0.0,
             encoder_step_m: 0.0,
             jitter: 0.0,
@@ -115,6 +124,10 @@ impl MisspecificationAmounts {
             Wrong::SurfaceEach => it.surface_each_m = pick([0.5e-3, 1e-3, 2e-3]),
             Wrong::Coefficients => it.coefficients = pick([0.10, 0.20, 0.28]),
             Wrong::Guess => it.guess = pick([1.6, 3.0, 10.0]),
+            Wrong::NoScenario => {
+                it.has_scenario = false;
+                it.stack = [LayerStack::Few, LayerStack::Usual, LayerStack::Five][severity as usize];
+            }
             Wrong::Encoder => it.encoder_m = pick([2e-6, 10e-6, 20e-6]),
             Wrong::EncoderSteps => it.encoder_step_m = pick([5e-6, 20e-6, 50e-6]),
             Wrong::Jitter => it.jitter = pick([0.1, 0.2, 0.3]),

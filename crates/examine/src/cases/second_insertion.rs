@@ -86,7 +86,11 @@ impl SecondInsertion {
     pub fn question(&self) -> Question {
         let name = format!("case {:016x}", self.id.case_seed());
         Question {
-            assumed_ron: draw_tissue::scenario_ron(&name, &self.setup.assumed, self.setup.amounts.rate_hz),
+            assumed_ron: Some(draw_tissue::scenario_ron(
+                &name,
+                &self.setup.assumed,
+                self.setup.amounts.rate_hz,
+            )),
             name,
             recordings: self.made.iter().map(|m| m.1.clone()).collect(),
         }

@@ -99,6 +99,12 @@ pub struct Answer {
 }
 
 impl Answer {
+    /// Number of layers in its base parameters.
+    #[must_use]
+    pub fn layer_count(&self) -> usize {
+        self.base_parameters.iter().map(|p| p.layer).max().unwrap_or(0)
+    }
+
     /// "Nothing is wrong."
     #[must_use]
     pub fn none() -> Self {

@@ -24,6 +24,7 @@
 //!    (a foundation spring may be `deep_indentation`), and `unknown` is right as well.
 //! 10. **Traces never count**, nor does what is listed as invisible.
 //! 11. **A class** (`equivalent`) counts as its best member would if it holds a right one among at most four.
+//! 12. **Without a scenario** the number of layers has to be right as well.
 
 use crate::cases::case_definition::CaseSetup;
 use crate::cases::case_id::{CaseId, Hide};
@@ -76,6 +77,8 @@ pub struct Expected {
     pub outside: bool,
     /// Whether `unknown` is right as well.
     pub unknown_is_right: bool,
+    /// Number of layers that have to be found; `None` when a scenario gives it.
+    pub layers: Option<usize>,
 }
 
 /// What an answer was worth.
@@ -101,6 +104,8 @@ pub fn expected_answer(id: &CaseId, setup: &CaseSetup) -> Expected {
         out.wanted.push(expected_cause(effect, setup));
     }
     let a = &setup.amounts;
+    // Rule 12.
+    out.layers = (!a.has_scenario).then_some(setup.truth.layers.len());
     // Rule 2.
     if a.late_samples > 0.0 {
         out.optional.push("time_delay".to_owned());
@@ -129,7 +134,7 @@ fn expected_cause(effect: &Effect, setup: &CaseSetup) -> ExpectedCause {
         unseen: false,
     };
     let interval_s = 1.0 / setup.amounts.rate_hz;
-    let is_guess = setup.amounts.guess > 1.0;
+    let is_guess = setup.amounts.is_tissue_guessed();
     let passes_for_dry = || {
         unexplained_rms_n(setup, core::slice::from_ref(effect), None, RefitTerms::DryFriction)
             < DRY_FRICTION_LIMIT_SD * setup.noise.sd_n
@@ -222,7 +227,8 @@ pub fn score_answer(expected: &Expected, answer: &Answer) -> AnswerScore {
     } else {
         !missing && !stray && (says_allowed || !expected.asks_for_allowed)
     };
-    AnswerScore { correct: right, wrong_name: stray, all_found }
+    let has_layers = expected.layers.is_none_or(|count| count == answer.layer_count());
+    AnswerScore { correct: right && has_layers, wrong_name: stray, all_found }
 }
 
 #[cfg(test)]

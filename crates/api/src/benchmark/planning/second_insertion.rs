@@ -1,6 +1,6 @@
 //! One case: diagnosed after one insertion and, when that leaves the cause open, after a second one.
 
-use crate::benchmark::answer_question::{answer_question, scenario_and_recordings};
+use crate::benchmark::answer_question::{answer_question, assumed_scenario, named_recordings};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use stylet_diagnose::Options;
@@ -68,7 +68,8 @@ fn diagnose_twice(id: &CaseId, case: &mut PlanningCase) -> Result<(), String> {
         return Ok(());
     }
     first.add_insertion(first.constant()).map_err(|e| text(&e))?;
-    let (scenario, recordings) = scenario_and_recordings(&first.question())?;
+    let question = first.question();
+    let (scenario, recordings) = (assumed_scenario(&question)?, named_recordings(&question));
     let result = stylet_diagnose::diagnose(&scenario, &recordings, &Options::default(), |_| {})
         .map_err(|e| text(&e))?;
     let d = &result.diagnosis;
