@@ -8,6 +8,49 @@ use stylet::Scenario;
 use support::{Scratch, stderr_text, stylet, text};
 
 #[test]
+fn the_space_behind_the_tissue_is_no_layer_and_dry_friction_is_named_whatever_layers_are_assumed() {
+    let scratch = Scratch::new("behind");
+    let scenario = |layers: &str, effects: &str| {
+        format!(
+            "Scenario(name: \"two gels\", tissue: (layers: [{layers}]), {effects} motion: Program(start_m: -0.005, segments: [
+                Move(velocity_mps: 0.002, duration_s: 15.0), Hold(duration_s: 3.0),
+                Ripple(velocity_mps: 0.003, amplitude_mps: 0.001, frequency_hz: 0.5, duration_s: 15.0),
+                Move(velocity_mps: -0.004, duration_s: 5.0)]), sensor: ForceTorque(noise_n: 0.01, ar1: 0.5))"
+        )
+    };
+    let layer = |thickness_m: f64, stiffness: f64, friction: f64, puncture: &str| {
+        format!(
+            "(thickness_m: {thickness_m:?}, stiffness_n_per_m: {stiffness:?}, friction_ns_per_m2: {friction:?}{puncture}),"
+        )
+    };
+    let two = layer(0.02, 50.0, 9e3, ", puncture_n: 0.8") + &layer(0.04, 90.0, 14e3, "");
+    let three = two.clone() + &layer(0.03, 60.0, 10e3, "");
+    let real = scratch.file("real.ron", &scenario(&two, "effects: [CoulombFriction(c_n_per_m: 3.0)],"));
+    let recordings: Vec<String> = ["1", "2"]
+        .iter()
+        .map(|seed| {
+            let out = text(&scratch.path().join(seed));
+            let output = stylet(&["run", &text(&real), "--quiet", "--seed", seed, "--out", &out]);
+            assert!(output.status.success(), "{}", stderr_text(&output));
+            format!("{out}/recording.csv")
+        })
+        .collect();
+    let out = text(&scratch.path().join("out"));
+    let said = |arguments: &[&str]| {
+        let more = ["--data", &recordings[0], &recordings[1], "--out", &out];
+        let output = stylet(&[arguments, &more].concat());
+        assert!(output.status.success(), "{}", stderr_text(&output));
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let found = said(&["identify"]);
+    assert!(found.contains("2 layers,") && found.contains("lacks coulomb_friction."), "{found}");
+    let assumed = text(&scratch.file("assumed.ron", &scenario(&three, "")));
+    let found = said(&["diagnose", &assumed]);
+    assert!(found.contains("the recordings show 2 layers, not 3"), "{found}");
+    assert!(found.contains("lacks coulomb_friction."), "{found}");
+}
+
+#[test]
 fn the_layers_of_a_simulated_insertion_are_found_without_a_scenario() {
     let scratch = Scratch::new("identify");
     let source = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/three_layers.ron");

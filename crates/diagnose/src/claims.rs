@@ -60,14 +60,15 @@ pub(crate) fn apply(d: &mut Diagnosis, context: &Context) {
 /// Whether a finding contradicts agreement.
 #[must_use]
 pub fn contradicts(kind: FindingKind) -> bool {
-    !matches!(kind, FindingKind::OneRecording | FindingKind::OneMotion | FindingKind::OutOfTolerance)
+    use FindingKind as K;
+    !matches!(kind, K::OneRecording | K::OneMotion | K::OutOfTolerance | K::LayerCount)
 }
 
 /// Largest confidence that these findings allow.
 fn max_confidence(findings: &[Finding]) -> f64 {
     let most = |f: &Finding| match f.kind {
         FindingKind::OneRecording | FindingKind::OneMotion => MAX_CONFIDENCE_FEW,
-        FindingKind::OutlierRecording | FindingKind::OutOfTolerance => 1.0,
+        FindingKind::OutlierRecording | FindingKind::OutOfTolerance | FindingKind::LayerCount => 1.0,
         _ => MAX_CONFIDENCE_CONTRADICTED,
     };
     findings.iter().map(most).fold(1.0, f64::min)

@@ -59,11 +59,8 @@ pub struct DiagnosisResult {
 /// Why an effect is negligible in the presence of an unmodelled one.
 pub const REASON_IMITATES_UNMODELLED: &str = "may imitate an effect that the library does not contain";
 
-/// Compares recordings with the prediction of a scenario.
-///
-/// # Errors
-/// [`DiagnoseError`] when the recordings do not fit the scenario.
-pub fn diagnose(
+/// Compares recordings with the prediction of a scenario that has as many layers as the tissue.
+pub(crate) fn diagnose_given_layers(
     scenario: &Scenario,
     recordings: &[NamedRecording],
     options: &Options,

@@ -213,6 +213,8 @@ pub enum FindingKind {
     AtBound,
     /// A parameter is outside the tolerance of the assumed value.
     OutOfTolerance,
+    /// The recordings show another number of layers than the scenario has.
+    LayerCount,
     /// Recordings differ too much for one model.
     Scatter,
     /// The noise is far above that of the scenario's sensor, or above that in air.

@@ -40,8 +40,9 @@ mod general_forms;
 pub mod geometry_selection;
 pub mod held_out;
 mod identifiability;
-mod identify;
+
 mod input_checks;
+mod layer_count;
 mod local_minima;
 mod mains_frequency;
 mod measured_start;
@@ -69,11 +70,11 @@ mod verdict;
 mod zero_steps;
 
 pub use competing_effects::EQUIVALENCE_NATS;
-pub use diagnose::{DiagnosisResult, Options, REASON_IMITATES_UNMODELLED, assumptions_of, diagnose};
+pub use diagnose::{DiagnosisResult, Options, REASON_IMITATES_UNMODELLED, assumptions_of};
 pub use diagnosis_json::{Diagnosis, Verdict};
 pub use error::DiagnoseError;
-pub use identify::{identify, scenario_from_recordings};
 pub use input_checks::NamedRecording;
+pub use layer_count::{diagnose, identify, scenario_from_recordings};
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -20,8 +20,10 @@ const BETTER_FACTOR: f64 = 2.0;
 
 /// The search for effects from the assumed numbers, or from those in the data.
 ///
-/// Numbers in the data are the start where the assumed ones leave more than noise and differ by more than their tolerance. That search
-/// stands if it explains the force and its numbers are still outside the tolerance. Else the search from the assumed numbers decides.
+/// Numbers in the data are considered where the assumed ones leave more than noise and differ by more than their tolerance, unless they
+/// fit far worse. They come first where they need no effect, fit far better, or fit better while the fit from the assumed numbers
+/// leaves the tolerance. The first search stands if it explains the force: from the assumed numbers by numbers inside the tolerance,
+/// from the data by numbers outside it and at most one effect. Of two searches the one that explains the force stands, of two that do the one with fewer effects.
 /// `None` when the model cannot be replayed.
 pub(crate) fn search_from_any_start(
     prepared: PreparedRecordings,
@@ -30,21 +32,35 @@ pub(crate) fn search_from_any_start(
 ) -> Option<(Search, PreparedRecordings)> {
     let (base, data) = fit_base_law(&prepared)?;
     let measured = if leaves_noise(&base, &data) { None } else { fit_from_data(&prepared, recordings) };
+    let ratio = |fit: &Fit, data_of_fit: &FitData| base.rms_n(&data) / fit.rms_n(data_of_fit);
+    let measured = measured.filter(|(_, fit, data_of_fit)| ratio(fit, data_of_fit) * BETTER_FACTOR > 1.0);
     let Some((measured, fit, data_of_fit)) = measured else {
         return Some(search(&prepared, base, data, progress));
     };
+    let ratio = ratio(&fit, &data_of_fit);
     let explains = |found: &Search| found.leaves_noise(&found.best);
-    let from_data = search(&measured, fit, data_of_fit, progress);
-    let data_explains = explains(&from_data.0);
-    if data_explains && is_out_of_tolerance(&prepared.assumed, &from_data.0.best) {
-        return Some(from_data);
+    let count = |found: &Search| found.best.model.effects.len();
+    let is_out = |fit: &Fit| is_out_of_tolerance(&prepared.assumed, fit);
+    let from_data = |progress: &mut _| search(&measured, fit.clone(), data_of_fit.clone(), progress);
+    let from_assumed = |progress: &mut _| search(&prepared, base.clone(), data.clone(), progress);
+    let data_first =
+        leaves_noise(&fit, &data_of_fit) || ratio > BETTER_FACTOR || (ratio > 1.0 && is_out(&base));
+    let first = if data_first { from_data(progress) } else { from_assumed(progress) };
+    let has_at_most_one = count(&first.0) <= 1;
+    if explains(&first.0) && is_out(&first.0.best) == data_first && (has_at_most_one || !data_first) {
+        return Some(first);
     }
-    progress("starting again from the assumed numbers");
-    let from_assumed = search(&prepared, base, data, progress);
+    progress("searching from other numbers");
+    let (assumed, data) =
+        if data_first { (from_assumed(progress), first) } else { (first, from_data(progress)) };
     let rms_n = |found: &Search| found.best.rms_n(&found.data);
-    let is_better = explains(&from_assumed.0)
-        || (!data_explains && rms_n(&from_data.0) < BETTER_FACTOR * rms_n(&from_assumed.0));
-    Some(if is_better { from_assumed } else { from_data })
+    let is_data_better = match (explains(&assumed.0), explains(&data.0)) {
+        (true, true) if is_out(&assumed.0.best) => count(&data.0) <= count(&assumed.0),
+        (true, true) => count(&data.0) < count(&assumed.0),
+        (false, false) => rms_n(&assumed.0) > BETTER_FACTOR * rms_n(&data.0),
+        (_, data_explains) => data_explains,
+    };
+    Some(if is_data_better { data } else { assumed })
 }
 
 /// The search from a fit of the base law, with the recordings it was fitted to.

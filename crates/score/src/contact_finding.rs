@@ -10,6 +10,8 @@ use stylet_core::{Baseline, BaselineKind, EnhanceConfig, Enhancer, Output, Sampl
 /// Log odds in nats at which the recording begins in the tissue, from the errors of prediction of both starts: these are correlated,
 /// and a start in air is usual.
 const MIN_LOADED_NATS: f64 = 30.0;
+/// Errors of prediction closer than this (s) count as one: what a model lacks does not change from sample to sample.
+const INDEPENDENT_S: f64 = 5e-3;
 /// Used samples before which the baseline in air is not known.
 const BASELINE_SAMPLES: f64 = 100.0;
 /// Most by which learning a moving baseline on the way raises the variance in air.
@@ -152,14 +154,17 @@ struct Errors {
     neighbours_n2: f64,
     loaded_n2: f64,
     count: f64,
+    /// Number of independent errors.
+    independent: f64,
 }
 
 impl Errors {
-    fn push(&mut self, air_n: f64, before_n: f64, loaded_n: f64) {
+    fn push(&mut self, air_n: f64, before_n: f64, loaded_n: f64, interval_s: f64) {
         if !(air_n.is_finite() && before_n.is_finite() && loaded_n.is_finite()) {
             return;
         }
         self.count += 1.0;
+        self.independent += (interval_s / INDEPENDENT_S).clamp(0.0, 1.0);
         let share = 1.0 / self.count;
         self.air_n2 += share * (air_n * air_n - self.air_n2);
         self.neighbours_n2 += share * (air_n * before_n - self.neighbours_n2);
@@ -168,7 +173,7 @@ impl Errors {
 
     /// Log odds in nats of a start in the tissue, when the air's errors have this variance.
     fn nats(&self, air_n2: f64) -> f64 {
-        if self.loaded_n2 > 0.0 { 0.5 * self.count * (air_n2 / self.loaded_n2).ln() } else { 0.0 }
+        if self.loaded_n2 > 0.0 { 0.5 * self.independent * (air_n2 / self.loaded_n2).ln() } else { 0.0 }
     }
 }
 
@@ -181,8 +186,9 @@ pub struct ContactAssessor {
     behind: Errors,
     /// Deviations from the baseline in air, and errors of the start in the tissue, as long as there is no contact.
     in_air: Errors,
-    /// The last deviation in N, and the number of used samples.
+    /// The last deviation in N, its time in s, and the number of used samples.
     last_deviation_n: f64,
+    last_s: f64,
     used: f64,
     zero_steps: Vec<ZeroStep>,
     last: Option<(Option<f64>, f64, f64)>,
@@ -219,14 +225,15 @@ impl ContactAssessor {
         self.span_m = Some([low.min(z), high.max(z)]);
         self.used += 1.0;
         let deviation_n = sample.force_n - out.baseline.offset_n;
+        let interval_s = sample.time_s - self.last_s;
         if let Some(loaded) = loaded.filter(|o| o.used && sample.velocity_mps > 0.0) {
             if out.contact_m.is_some() {
-                self.behind.push(out.error_n, 0.0, loaded.error_n);
+                self.behind.push(out.error_n, 0.0, loaded.error_n, interval_s);
             } else if self.used > BASELINE_SAMPLES {
-                self.in_air.push(deviation_n, self.last_deviation_n, loaded.error_n);
+                self.in_air.push(deviation_n, self.last_deviation_n, loaded.error_n, interval_s);
             }
         }
-        self.last_deviation_n = deviation_n;
+        (self.last_deviation_n, self.last_s) = (deviation_n, sample.time_s);
     }
 
     /// The finding for this setting.

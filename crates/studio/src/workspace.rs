@@ -101,13 +101,15 @@ impl Workspace {
         Ok(write_file_atomically(&path, content)?)
     }
 
-    /// Adds a recording under a safe name, which is returned. One of the same name is replaced.
+    /// Adds a recording under a safe name, which is returned. Where another file has that name, the new one gets a number:
+    /// `recording-2.csv`.
     ///
     /// # Errors
     /// When the name is unusable, or the file cannot be stored.
     pub fn add(&mut self, name: &str, from: &Path) -> Result<String, Problem> {
         let name = file_name(name)
             .ok_or_else(|| Problem::new("the file needs a name; rename it and drop it again"))?;
+        let name = self.free_name(&name, from);
         if self.journal.files.len() >= MAX_FILES && !self.journal.files.contains(&name) {
             return Err(Problem::new(format!(
                 "a workspace holds at most {MAX_FILES} recordings; remove one first"
@@ -122,6 +124,17 @@ impl Workspace {
         }
         self.write_journal()?;
         Ok(name)
+    }
+
+    /// The name, with a number where another file than `from` has it.
+    fn free_name(&self, name: &str, from: &Path) -> String {
+        let is_taken = |name: &str| {
+            self.journal.files.iter().any(|known| known == name)
+                && fs::read(self.root.join("data").join(name)).ok() != fs::read(from).ok()
+        };
+        let (stem, ending) = name.rfind('.').map_or((name, ""), |dot| name.split_at(dot));
+        let numbered = |k: usize| if k == 1 { name.to_owned() } else { format!("{stem}-{k}{ending}") };
+        (1..=MAX_FILES + 1).map(numbered).find(|name| !is_taken(name)).unwrap_or_else(|| name.to_owned())
     }
 
     /// Forgets a recording and removes it from the workspace.
@@ -188,4 +201,26 @@ pub fn file_name(given: &str) -> Option<String> {
     let name: String = name.chars().skip(surplus).collect();
     let name = name.trim_start_matches('.');
     (!name.is_empty()).then(|| name.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_recordings_of_one_name_are_both_kept() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut workspace = Workspace::open(&folder.path().join("workspace")).expect("a workspace");
+        let mut add = |folder_name: &str, text: &str| {
+            let from = folder.path().join(folder_name);
+            fs::create_dir_all(&from).expect("a folder");
+            fs::write(from.join("recording.csv"), text).expect("a file");
+            workspace.add("recording.csv", &from.join("recording.csv")).expect("added")
+        };
+        assert_eq!(add("a", "1"), "recording.csv");
+        assert_eq!(add("b", "2"), "recording-2.csv");
+        // The same file again is no other one.
+        assert_eq!(add("a", "1"), "recording.csv");
+        assert_eq!(workspace.files(), ["recording.csv", "recording-2.csv"]);
+    }
 }

@@ -95,3 +95,14 @@ fn a_step_of_the_zero_in_tissue_is_reported_and_no_contact() {
         assert!(found.contact_m.is_some_and(|z| z.abs() < 5e-4), "{found:?}");
     }
 }
+
+#[test]
+fn the_sampling_rate_does_not_decide_whether_a_recording_begins_loaded() {
+    let nats = |count: u32, interval_s: f64| {
+        let mut errors = Errors::default();
+        (0..count).for_each(|_| errors.push(0.0103, 0.0, 0.01, interval_s));
+        errors.nats(errors.air_n2)
+    };
+    let (usual, fast) = (nats(2000, 5e-3), nats(100_000, 1e-4));
+    assert!(usual > MIN_LOADED_NATS && (usual / fast - 1.0).abs() < 1e-6, "{usual} and {fast}");
+}

@@ -1,7 +1,7 @@
 //! A diagnosis in one sentence.
 
 use stylet_diagnose::claims::{contradicts, parameter_name};
-use stylet_diagnose::diagnosis_json::{BaseParameter, Cause, Diagnosis, FindingKind, Verdict};
+use stylet_diagnose::diagnosis_json::{BaseParameter, Cause, Diagnosis, Finding, FindingKind, Verdict};
 use stylet_record::QualityKind;
 use stylet_stats::number_format::significant;
 
@@ -71,7 +71,9 @@ fn verdict(d: &Diagnosis) -> String {
             format!("No effect of the library is needed beyond the base law{but}.")
         }
         Verdict::Parameters => {
-            let off = d.findings.iter().filter(|f| f.kind == FindingKind::OutOfTolerance);
+            let is_off =
+                |f: &&Finding| matches!(f.kind, FindingKind::OutOfTolerance | FindingKind::LayerCount);
+            let off = d.findings.iter().filter(is_off);
             let off: Vec<&str> = off.map(|f| f.message.as_str()).collect();
             format!(
                 "No effect of the library is missing, but numbers of the scenario are wrong: {}.",

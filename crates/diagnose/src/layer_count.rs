@@ -1,0 +1,136 @@
+//! The number of layers, from the recordings: without a scenario, and where they contradict the scenario's.
+
+use crate::claims;
+use crate::diagnose::{DiagnosisResult, Options, diagnose_given_layers};
+use crate::diagnosis_json::{Diagnosis, Finding, FindingKind, Verdict};
+use crate::error::DiagnoseError;
+use crate::found_tissue::{FoundTissue, MIN_FORCE_SHARE};
+use crate::input_checks::{CleanRecordings, NamedRecording, check_length, clean_recordings};
+use crate::measured_start::TOLERANCE;
+use stylet_identify::model::Assumptions;
+use stylet_scenario::{Motion, Scenario};
+
+/// Finds the layers that recordings show, `layers` of them or as many as there are, and diagnoses what is left: the scenario that
+/// the diagnosis started from, under weak priors, and the diagnosis.
+///
+/// A last layer that turns out to bear no force is the space behind the tissue; the diagnosis is repeated without it.
+///
+/// # Errors
+/// [`DiagnoseError`] when a recording is too short, none has a contact, or fewer than `layers` are found.
+pub fn identify(
+    name: &str,
+    recordings: &[NamedRecording],
+    layers: Option<usize>,
+    options: &Options,
+    mut progress: impl FnMut(&str),
+) -> Result<(Scenario, DiagnosisResult), DiagnoseError> {
+    progress("looking for layers");
+    let scenario = scenario_from_recordings(name, recordings, layers)?;
+    if layers.is_some() {
+        let result = diagnose_given_layers(&scenario, recordings, options, progress)?;
+        return Ok((scenario, result));
+    }
+    diagnose_without_empty_layer(scenario, recordings, options, &mut progress)
+}
+
+/// Compares recordings with the prediction of a scenario. Where the result is contradicted and another number of layers, as the
+/// recordings show it, gives one that is not, that one stands, with a finding.
+///
+/// # Errors
+/// [`DiagnoseError`] when the recordings do not fit the scenario.
+pub fn diagnose(
+    scenario: &Scenario,
+    recordings: &[NamedRecording],
+    options: &Options,
+    mut progress: impl FnMut(&str),
+) -> Result<DiagnosisResult, DiagnoseError> {
+    let result = diagnose_given_layers(scenario, recordings, options, &mut progress)?;
+    let is_contradicted = |d: &Diagnosis| {
+        d.verdict == Verdict::Unknown || d.findings.iter().any(|f| claims::contradicts(f.kind))
+    };
+    let assumed = scenario.tissue.layers.len();
+    if !is_contradicted(&result.diagnosis) {
+        return Ok(result);
+    }
+    let is_other = |found: &Scenario| {
+        found.tissue.layers.len() != assumed || (assumed > 1 && !bears_force(&result, recordings))
+    };
+    let found = scenario_from_recordings(&scenario.name, recordings, None).ok().filter(is_other);
+    let Some(found) = found else { return Ok(result) };
+    progress("starting again with the layers in the data");
+    let (tolerance, thickness_tolerance) = (scenario.tolerance, scenario.thickness_tolerance);
+    let start = Scenario {
+        tissue: found.tissue,
+        tolerance: found.tolerance,
+        thickness_tolerance: found.thickness_tolerance,
+        ..scenario.clone()
+    };
+    let (start, mut other) = diagnose_without_empty_layer(start, recordings, options, &mut progress)?;
+    let count = start.tissue.layers.len();
+    if is_contradicted(&other.diagnosis) || count == assumed {
+        return Ok(result);
+    }
+    let message =
+        format!("the recordings show {count} layer{}, not {assumed}", if count == 1 { "" } else { "s" });
+    let d = &mut other.diagnosis;
+    d.findings.insert(0, Finding { kind: FindingKind::LayerCount, message });
+    d.agrees = false;
+    if d.verdict == Verdict::None {
+        d.verdict = Verdict::Parameters;
+    }
+    (other.extended_scenario.tolerance, other.extended_scenario.thickness_tolerance) =
+        (tolerance, thickness_tolerance);
+    Ok(other)
+}
+
+/// Diagnoses, and again without the last layer as long as that bears no force.
+fn diagnose_without_empty_layer(
+    mut scenario: Scenario,
+    recordings: &[NamedRecording],
+    options: &Options,
+    progress: &mut impl FnMut(&str),
+) -> Result<(Scenario, DiagnosisResult), DiagnoseError> {
+    loop {
+        let result = diagnose_given_layers(&scenario, recordings, options, &mut *progress)?;
+        let count = scenario.tissue.layers.len();
+        if count == 1 || bears_force(&result, recordings) {
+            return Ok((scenario, result));
+        }
+        progress("again without the last layer, which bears no force");
+        scenario.tissue.layers.truncate(count - 1);
+    }
+}
+
+/// Whether the last layer's elastic force at the deepest point is a noticeable share of the largest force.
+fn bears_force(result: &DiagnosisResult, recordings: &[NamedRecording]) -> bool {
+    let tissue = &result.search.best.model.tissue;
+    let Some(last) = tissue.layers.len().checked_sub(1) else { return true };
+    let largest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let over_all = |f: fn(&NamedRecording) -> &[f64]| {
+        recordings.iter().map(|r| largest(f(r))).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let depth_m = over_all(|r| &r.recording.position_m) - tissue.front_m(last);
+    let depth_m = depth_m.min(tissue.layers[last].thickness_m);
+    tissue.layers[last].stiffness_n_per_m * depth_m > MIN_FORCE_SHARE * over_all(|r| &r.recording.force_n)
+}
+
+/// A scenario with the layers that the recordings show, `layers` of them or as many as there are, and weak priors about their
+/// numbers.
+///
+/// # Errors
+/// [`DiagnoseError`] when a recording is too short, none has a contact, or fewer than `layers` are found.
+pub fn scenario_from_recordings(
+    name: &str,
+    recordings: &[NamedRecording],
+    layers: Option<usize>,
+) -> Result<Scenario, DiagnoseError> {
+    check_length(recordings)?;
+    let CleanRecordings { recordings: clean, .. } = clean_recordings(recordings);
+    let found = FoundTissue::new(&clean, layers).ok_or(DiagnoseError::NoContact)?;
+    if let Some(asked) = layers.filter(|asked| *asked > found.layers.len()) {
+        return Err(DiagnoseError::FewerLayers { asked, found: found.layers.len() });
+    }
+    let mut scenario = Scenario::new(name.to_owned(), found.tissue(), Motion::Recorded);
+    (scenario.tolerance, scenario.thickness_tolerance) = (TOLERANCE, Assumptions::GUESSED_TOLERANCE);
+    Ok(scenario)
+}
