@@ -25,7 +25,7 @@ fn the_space_behind_the_tissue_is_no_layer_and_dry_friction_is_named_whatever_la
     };
     let two = layer(0.02, 50.0, 9e3, ", puncture_n: 0.8") + &layer(0.04, 90.0, 14e3, "");
     let three = two.clone() + &layer(0.03, 60.0, 10e3, "");
-    let real = scratch.file("real.ron", &scenario(&two, "effects: [CoulombFriction(c_n_per_m: 3.0)],"));
+    let real = scratch.file("real.ron", scenario(&two, "effects: [CoulombFriction(c_n_per_m: 3.0)],"));
     let recordings: Vec<String> = ["1", "2"]
         .iter()
         .map(|seed| {
@@ -44,7 +44,7 @@ fn the_space_behind_the_tissue_is_no_layer_and_dry_friction_is_named_whatever_la
     };
     let found = said(&["identify"]);
     assert!(found.contains("2 layers,") && found.contains("lacks coulomb_friction."), "{found}");
-    let assumed = text(&scratch.file("assumed.ron", &scenario(&three, "")));
+    let assumed = text(&scratch.file("assumed.ron", scenario(&three, "")));
     let found = said(&["diagnose", &assumed]);
     assert!(found.contains("the recordings show 2 layers, not 3"), "{found}");
     assert!(found.contains("lacks coulomb_friction."), "{found}");
