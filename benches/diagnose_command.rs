@@ -21,7 +21,8 @@ fn set<T: std::str::FromStr>(name: &str) -> Option<T> {
 fn write(case: &Case, folder: &Path) -> Vec<PathBuf> {
     std::fs::create_dir_all(folder).expect("a folder for the recordings");
     let assumed = folder.join("assumed.ron");
-    std::fs::write(&assumed, &case.question.assumed_ron).expect("written");
+    let assumed_ron = case.question.assumed_ron.as_deref().expect("a scenario");
+    std::fs::write(&assumed, assumed_ron).expect("written");
     let mut files = vec![assumed];
     for (k, named) in case.question.recordings.iter().enumerate() {
         let file = folder.join(format!("{k}.csv"));
