@@ -52,8 +52,9 @@ pub fn diagnose(
     if !is_contradicted(&result.diagnosis) {
         return Ok(result);
     }
+    // Even where as many layers are found, the last of them may turn out to be empty.
     let is_other = |found: &Scenario| {
-        found.tissue.layers.len() != assumed || (assumed > 1 && !bears_force(&result, recordings))
+        found.tissue.layers.len() != assumed || result.diagnosis.verdict != Verdict::Unknown
     };
     let found = scenario_from_recordings(&scenario.name, recordings, None).ok().filter(is_other);
     let Some(found) = found else { return Ok(result) };
