@@ -66,7 +66,11 @@ pub fn diagnose(
         thickness_tolerance: found.thickness_tolerance,
         ..scenario.clone()
     };
-    let (start, mut other) = diagnose_without_empty_layer(start, recordings, options, &mut progress)?;
+    // What cannot be diagnosed with other layers is no reason to lose the result.
+    let Ok((start, mut other)) = diagnose_without_empty_layer(start, recordings, options, &mut progress)
+    else {
+        return Ok(result);
+    };
     let count = start.tissue.layers.len();
     if is_contradicted(&other.diagnosis) || count == assumed {
         return Ok(result);

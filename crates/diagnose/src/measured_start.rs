@@ -23,7 +23,8 @@ const BETTER_FACTOR: f64 = 2.0;
 /// Numbers in the data are considered where the assumed ones leave more than noise and differ by more than their tolerance, unless they
 /// fit far worse. They come first where they need no effect, fit far better, or fit better while the fit from the assumed numbers
 /// leaves the tolerance. The first search stands if it explains the force: from the assumed numbers by numbers inside the tolerance,
-/// from the data by numbers outside it and at most one effect. Of two searches the one that explains the force stands, of two that do the one with fewer effects.
+/// from the data by numbers outside it and at most one effect. Of two searches the one that explains the force stands, of two that do
+/// the one with fewer effects.
 /// `None` when the model cannot be replayed.
 pub(crate) fn search_from_any_start(
     prepared: PreparedRecordings,
