@@ -9,9 +9,6 @@ use stylet_tissue::{Layer, Tissue};
 
 /// Thinnest layer in m.
 const MIN_THICKNESS_M: f64 = 5e-4;
-/// Elastic force of the last layer at the deepest point, relative to the largest force, below which the tip has left the
-/// tissue.
-pub(crate) const MIN_FORCE_SHARE: f64 = 0.01;
 
 /// Layers that the online algorithm found in several recordings: medians over those with the same number of layers.
 pub(crate) struct FoundTissue {
@@ -46,7 +43,7 @@ impl FoundTissue {
             if trace.contact.is_loaded_unexpectedly() {
                 return None;
             }
-            Some(without_exit(found_layers(&trace, &r.position_m)?, r)).filter(|found| !found.is_empty())
+            found_layers(&trace, r).filter(|found| !found.is_empty())
         };
         let all: Vec<Vec<FoundLayer>> = recordings.par_iter().filter_map(layers).collect();
         let all: Vec<Vec<FoundLayer>> = match count {
@@ -92,16 +89,6 @@ impl FoundTissue {
         };
         Tissue { surface_m: self.surface_m, layers: self.layers.iter().enumerate().map(layer).collect() }
     }
-}
-
-/// The layers without a last one in which no elastic force acts: the tip has left the tissue, or nothing elastic was touched.
-fn without_exit(mut found: Vec<FoundLayer>, recording: &Recording) -> Vec<FoundLayer> {
-    let peak_n = recording.force_n.iter().copied().fold(0.0, f64::max);
-    let leaves = |l: &FoundLayer| l.stiffness_n_per_m * l.thickness_m < MIN_FORCE_SHARE * peak_n;
-    if found.last().is_some_and(leaves) {
-        found.pop();
-    }
-    found
 }
 
 /// The first `count` layers; the last of them continues to the deepest position.

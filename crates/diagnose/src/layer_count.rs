@@ -4,11 +4,12 @@ use crate::claims;
 use crate::diagnose::{DiagnosisResult, Options, diagnose_given_layers};
 use crate::diagnosis_json::{Diagnosis, Finding, FindingKind, Verdict};
 use crate::error::DiagnoseError;
-use crate::found_tissue::{FoundTissue, MIN_FORCE_SHARE};
+use crate::found_tissue::FoundTissue;
 use crate::input_checks::{CleanRecordings, NamedRecording, check_length, clean_recordings};
 use crate::measured_start::TOLERANCE;
 use stylet_identify::model::Assumptions;
 use stylet_scenario::{Motion, Scenario};
+use stylet_score::MIN_FORCE_SHARE;
 
 /// Finds the layers that recordings show, `layers` of them or as many as there are, and diagnoses what is left: the scenario that
 /// the diagnosis started from, under weak priors, and the diagnosis.

@@ -112,7 +112,7 @@ impl ContactFinding {
             ContactHypothesis::LineInPosition => format!("a force of {} N/m linear in position", line()),
             ContactHypothesis::DriftOrLine => {
                 format!(
-                    "a drift of {} mN/s or a line of {} N/m (one speed does not tell them apart)",
+                    "a drift of {} mN/s or a line of {} N/m (one speed does not separate them)",
                     drift(),
                     line()
                 )

@@ -1,9 +1,13 @@
 //! Layers of the tissue as the online algorithm found them in one recording.
 
 use crate::enhancement_trace::Trace;
+use stylet_record::Recording;
 
 /// Distance in m from which a rupture before the next layer's front counts as one inside the layer.
 const MIN_GAP_M: f64 = 5e-4;
+
+/// Elastic force of the last layer at the deepest point, relative to the largest force, below which the tip has left the tissue.
+pub const MIN_FORCE_SHARE: f64 = 0.01;
 
 /// A layer that the online algorithm found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,9 +40,11 @@ impl FoundLayer {
 
 /// The layers from the contact to the deepest position, in order. `None` without a contact.
 ///
-/// A layer ends at its rupture, or where the next one begins if that is further on: the tip was free between them.
+/// A layer ends at its rupture, or where the next one begins if that is further on: the tip was free between them. A last one in which no
+/// elastic force acts is the space behind the tissue, and left out.
 #[must_use]
-pub fn found_layers(trace: &Trace, position_m: &[f64]) -> Option<Vec<FoundLayer>> {
+pub fn found_layers(trace: &Trace, recording: &Recording) -> Option<Vec<FoundLayer>> {
+    let position_m = &recording.position_m;
     let mut front_m = trace.contact_m?;
     let deepest = (0..position_m.len()).max_by(|a, b| position_m[*a].total_cmp(&position_m[*b]))?;
     let estimate = |layer: usize| trace.estimates.iter().find(|e| e.layer == layer);
@@ -58,12 +64,16 @@ pub fn found_layers(trace: &Trace, position_m: &[f64]) -> Option<Vec<FoundLayer>
     }
     let last = |column: &[f64]| column.iter().take(deepest + 1).rev().copied().find(|v| v.is_finite());
     let [stiffness, friction] = [&trace.stiffness_n_per_m, &trace.friction].map(|c| last(c).unwrap_or(0.0));
-    layers.push(FoundLayer {
-        front_m,
-        thickness_m: position_m[deepest] - front_m,
-        stiffness_n_per_m: stiffness,
-        friction_ns_per_m2: friction,
-        rupture_m: None,
-    });
+    let thickness_m = position_m[deepest] - front_m;
+    let peak_n = recording.force_n.iter().copied().fold(0.0, f64::max);
+    if stiffness * thickness_m >= MIN_FORCE_SHARE * peak_n {
+        layers.push(FoundLayer {
+            front_m,
+            thickness_m,
+            stiffness_n_per_m: stiffness,
+            friction_ns_per_m2: friction,
+            rupture_m: None,
+        });
+    }
     Some(layers)
 }

@@ -17,7 +17,7 @@ pub use enhancement_trace::{Trace, algorithm_name, coefficients, model_name, sco
 pub use enhancer_with_model::{
     EnhancerWithModel, MAX_STORED_SAMPLES, RecordingScale, enhancer_for, enhancer_in_units,
 };
-pub use found_layers::{FoundLayer, found_layers};
+pub use found_layers::{FoundLayer, MIN_FORCE_SHARE, found_layers};
 pub use measured_score::{MeasuredRecording, MeasuredScore, ModelFrictionScore};
 pub use offline_least_squares::{LayerSample, OfflineEstimate, fit_layer_offline};
 pub use rupture_matching::{MATCH_EARLIEST_S, MATCH_LATEST_S, RuptureScore, match_ruptures};

@@ -151,7 +151,7 @@ export class ExplainView {
     const { plan, prediction } = state;
     const further = h("div", { class: "row" }, state.files.map(file => button(file, () => this.begin("predict", { files: [file] }), { disabled: busy, "aria-label": `Predict ${file}` })));
     fill(this.next,
-      h("section", { class: "card" }, h("h2", {}, "What would tell causes apart?"), form,
+      h("section", { class: "card" }, h("h2", {}, "What would separate the causes?"), form,
         plan && h("div", {}, h("p", {}, plan.summary), h("ol", { class: "segments" }, plan.segments.map(segment => h("li", {}, segment))),
           plan.pairs.length > 0 && table({ head: ["candidate", "or", "nats now", "then"], rows: plan.pairs }, "pairs of candidates"),
           h("div", { class: "row" }, button("See it on the phantom", () => this.app.attempt(async () => {

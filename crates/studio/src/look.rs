@@ -13,6 +13,7 @@ use stylet_core::config::{Algorithm, Contact};
 use stylet_core::{Detection, LayerEstimate};
 use stylet_record::QualityNote;
 use stylet_report::{plus_minus, significant};
+use stylet_score::{Trace, found_layers};
 
 /// Thinnest layer that a dragged face or rupture leaves, in m.
 pub const MIN_THICKNESS_M: f64 = 5e-4;
@@ -144,6 +145,25 @@ pub fn corrected_ruptures(
     ruptures
 }
 
+/// What the algorithm found with the corrections: a rupture that was moved is the far face of its layer, at which the next one begins.
+pub fn corrected_trace(
+    algorithm: &str,
+    run: &AlgorithmRun,
+    corrections: &Corrections,
+    recording: &Recording,
+) -> Trace {
+    let mut trace = run.trace.clone();
+    let ruptures = corrected_ruptures(algorithm, run, corrections, recording);
+    for pair in ruptures.windows(2) {
+        let [(rupture, moved), (next, _)] = pair else { continue };
+        if let Some(estimate) = trace.estimates.iter_mut().find(|e| *moved && e.layer == next.layer) {
+            estimate.start_m = rupture.located_m;
+        }
+    }
+    trace.detections = ruptures.into_iter().map(|(rupture, _)| rupture).collect();
+    trace
+}
+
 fn run_view(algorithm: &str, run: &AlgorithmRun, corrections: &Corrections, recording: &Recording) -> Value {
     let trace = &run.trace;
     let contact = trace.contact_m.zip(trace.contact_s).map(|(z, time_s)| EventView {
@@ -160,9 +180,11 @@ fn run_view(algorithm: &str, run: &AlgorithmRun, corrections: &Corrections, reco
             label: format!("rupture {}{}", rupture.layer, if *moved { ", moved" } else { "" }),
         })
         .collect();
-    // The last layer ends at the deepest point.
+    // A last layer that did not rupture ends at the deepest point.
+    let found = found_layers(trace, recording).unwrap_or_default();
+    let is_in_tissue = found.last().is_some_and(|layer| layer.rupture_m.is_none());
     let deepest = recording.samples().max_by(|a, b| a.position_m.total_cmp(&b.position_m));
-    let end = deepest.map(|s| (millimetres(s.position_m), s.time_s));
+    let end = deepest.filter(|_| is_in_tissue).map(|s| (millimetres(s.position_m), s.time_s));
     let faces: Vec<_> =
         contact.iter().chain(&ruptures).map(|face| (face.depth_mm, face.time_s)).chain(end).collect();
     let layers = faces.windows(2).enumerate().map(|(k, face)| {
@@ -184,7 +206,7 @@ fn run_view(algorithm: &str, run: &AlgorithmRun, corrections: &Corrections, reco
         "ruptures": ruptures,
         "layers": layers.collect::<Value>(),
         "table": {
-            "head": ["layer", "from mm", "thick mm", "K N/m", "b N s/m²", "drop N"],
+            "head": ["layer", "from mm", "thickness mm", "K N/m", "b N s/m²", "drop N"],
             "rows": trace.estimates.iter().take(MAX_LISTED).map(layer_row).collect::<Value>(),
         },
     })

@@ -9,6 +9,7 @@ use crate::workspace::PHANTOM;
 use crate::{commands, look};
 use serde_json::{Value, json};
 use stylet_scenario::{Motion, Scenario, Segment};
+use stylet_score::{FoundLayer, found_layers};
 use stylet_tissue::{
     AnyEffect, Effect as _, EffectInfo, Layer, effect_info, general_effects, per_layer_effects,
 };
@@ -19,9 +20,6 @@ const APPROACH_M: f64 = 5e-3;
 const SPEED_MPS: f64 = 2.5e-3;
 /// Depth below the last layer's start that is added to layers found in a recording, relative to the layer, and at least in m.
 const BEYOND: (f64, f64) = (0.2, 5e-3);
-
-/// Elastic force of the last layer at the deepest point, relative to the largest force, below which the tip has left the tissue.
-const MIN_FORCE_SHARE: f64 = 0.01;
 
 const MOTIONS: [(&str, &str); 3] = [
     ("constant", "one constant speed"),
@@ -172,18 +170,18 @@ fn library_motion(scenario: &Scenario, name: &str) -> Option<Motion> {
 }
 
 /// A layer with rounded numbers that a scenario admits.
-fn layer(index: usize, thickness_m: f64, stiffness: f64, friction: f64, puncture_n: Option<f64>) -> Layer {
+fn layer((index, found): (usize, &FoundLayer)) -> Layer {
+    let puncture_n = found.rupture_force_n().filter(|n| found.is_ruptured_by_force() && *n > 0.0);
     Layer {
         name: format!("layer {}", index + 1),
-        thickness_m: rounded(thickness_m.max(MIN_THICKNESS_M)),
-        stiffness_n_per_m: rounded(stiffness.max(0.0)),
-        friction_ns_per_m2: rounded(friction.max(0.0)),
-        puncture_n: puncture_n.filter(|force_n| *force_n > 0.0),
+        thickness_m: rounded(found.thickness_m.max(MIN_THICKNESS_M)),
+        stiffness_n_per_m: rounded(found.stiffness_n_per_m.max(0.0)),
+        friction_ns_per_m2: rounded(found.friction_ns_per_m2.max(0.0)),
+        puncture_n: puncture_n.map(rounded),
     }
 }
 
-/// Layers from the online algorithm's estimates: faces where ruptures were located, the last layer to below the deepest point unless the tip
-/// has left the tissue.
+/// Layers from the online algorithm's estimates; the last one to below the deepest point unless the tip has left the tissue.
 fn from_recording(
     studio: &mut Studio,
     file: &str,
@@ -192,35 +190,18 @@ fn from_recording(
 ) -> Result<Scenario, Problem> {
     let loaded = studio.recording(file)?;
     let run = look::run_algorithm(studio, file, algorithm, corrections.contact_mm)?;
-    let (recording, trace) = (&loaded.recording, &run.trace);
-    let ruptures = look::corrected_ruptures(algorithm, &run, corrections, recording);
-    let surface_m = trace.contact_m.ok_or_else(|| {
-        Problem::new("no contact was detected in this recording, so there are no layers to start from; see its findings")
+    let recording = &loaded.recording;
+    let trace = look::corrected_trace(algorithm, &run, corrections, recording);
+    let found = found_layers(&trace, recording);
+    let found = found.filter(|found| !found.is_empty()).ok_or_else(|| {
+        Problem::new("no layer was found in this recording, so there is nothing to start from; see its findings")
     })?;
-    let deepest =
-        (0..recording.len()).max_by(|a, b| recording.position_m[*a].total_cmp(&recording.position_m[*b]));
-    let deepest = deepest.unwrap_or(0);
-    let mut layers: Vec<Layer> = Vec::new();
-    let mut front_m = surface_m;
-    for (k, (detection, moved)) in ruptures.iter().enumerate() {
-        let estimate = |layer: usize| trace.estimates.iter().find(|e| e.layer == layer);
-        let Some(e) = estimate(detection.layer) else { continue };
-        // A layer that ruptures before its far face: the tip is free until the next one begins.
-        let next_m = ruptures.get(k + 1).and_then(|(next, _)| Some(estimate(next.layer)?.start_m));
-        // A rupture that was moved is the far face.
-        let gap_m = next_m.filter(|next_m| !moved && *next_m > detection.located_m + MIN_THICKNESS_M);
-        let puncture_n = gap_m.map(|_| rounded(e.stiffness_n_per_m * (detection.located_m - front_m)));
-        let back_m = gap_m.unwrap_or(detection.located_m);
-        layers.push(layer(layers.len(), back_m - front_m, e.stiffness_n_per_m, e.friction, puncture_n));
-        front_m = back_m;
-    }
-    let last = |column: &[f64]| column.iter().take(deepest + 1).rev().copied().find(|v| v.is_finite());
-    let end_m = recording.position_m[deepest];
-    let beyond_m = (BEYOND.0 * (end_m - surface_m)).max(BEYOND.1);
-    let [stiffness, friction] = [&trace.stiffness_n_per_m, &trace.friction].map(|c| last(c).unwrap_or(0.0));
-    let peak_n = recording.force_n.iter().copied().fold(0.0, f64::max);
-    if layers.is_empty() || stiffness * (end_m - front_m) > MIN_FORCE_SHARE * peak_n {
-        layers.push(layer(layers.len(), end_m + beyond_m - front_m, stiffness, friction, None));
+    let mut layers: Vec<Layer> = found.iter().enumerate().map(layer).collect();
+    let deepest = recording.samples().enumerate().max_by(|a, b| a.1.position_m.total_cmp(&b.1.position_m));
+    let (deepest, end_m) = deepest.map_or((0, 0.0), |(index, s)| (index, s.position_m));
+    let surface_m = found[0].front_m;
+    if let Some(last) = layers.last_mut().filter(|_| found.last().is_some_and(|l| l.rupture_m.is_none())) {
+        last.thickness_m = rounded(last.thickness_m + (BEYOND.0 * (end_m - surface_m)).max(BEYOND.1));
     }
     let start_m = recording.position_m.first().copied().unwrap_or(0.0);
     let duration_s = recording.time_s[deepest] - recording.time_s[0];

@@ -71,7 +71,7 @@ pub enum Verdict {
     None,
     /// One or more causes.
     Named,
-    /// A class of effects that these data cannot tell apart.
+    /// A class of effects that these data cannot separate.
     Ambiguous,
     /// Structure that no effect of the library explains dominates.
     Unknown,

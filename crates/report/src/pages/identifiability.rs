@@ -1,4 +1,4 @@
-//! The page of an identifiability analysis: which effects an experiment can identify, and which it cannot tell apart.
+//! The page of an identifiability analysis: which effects an experiment can identify, and which it cannot separate.
 
 use crate::page_model::{Cell, Page, Section, Status, Table};
 use crate::pages::formatting::{effect_label, strength_parameters};

@@ -89,7 +89,7 @@ fn verdict(d: &Diagnosis) -> String {
                     .join(" or ")
             };
             format!(
-                "The simulation lacks {}: these recordings cannot tell them apart.",
+                "The simulation lacks {}: these recordings cannot separate them.",
                 d.causes.iter().map(class).collect::<Vec<_>>().join(", and ")
             )
         }
