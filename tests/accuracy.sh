@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# All accuracy tests of the diagnosis, those of some minutes included.
+# All accuracy tests of the diagnosis and of planning, those of some minutes included.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 cargo test --release --all-features --test diagnosis_accuracy -- --include-ignored
+cargo test --release --all-features -p stylet-plan --test planned_insertion -- --include-ignored

@@ -88,6 +88,7 @@ fn exceeds_tolerance(id: &CaseId) -> bool {
 
 /// Shifts larger than the assumed tolerance of a thickness.
 #[test]
+#[ignore = "a minute; tests/accuracy.sh"]
 fn a_shifted_boundary_is_distinguished_from_slightly_wrong_thicknesses() {
     let rows = [
         (Wrong::Nothing, 1),
@@ -134,6 +135,7 @@ fn a_rate_dependent_puncture_force_is_identified_under_wrong_assumptions() {
 
 /// Two spectral lines close together and of equal size are no single tone.
 #[test]
+#[ignore = "a minute; tests/accuracy.sh"]
 fn beats_are_not_identified_as_a_tone() {
     let outcomes =
         run_cases(&[case(Wrong::Nothing, Hide::Outside, 142, 6)], None, &answer, &|_, _| {}).expect("a run");
@@ -143,6 +145,7 @@ fn beats_are_not_identified_as_a_tone() {
 
 /// Sensor drift must neither imitate a boundary shift nor hide a tone in the coloured noise.
 #[test]
+#[ignore = "a minute; tests/accuracy.sh"]
 fn sensor_drift_is_no_boundary_shift_and_hides_no_tone() {
     let mut cases = vec![case(Wrong::Wander, Hide::Clean, 141, 0), case(Wrong::Wander, Hide::Clean, 141, 5)];
     for wrong in [Wrong::Wander, Wrong::Recordings] {

@@ -87,6 +87,7 @@ fn the_plan_does_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
+#[ignore = "a minute; tests/accuracy.sh"]
 fn the_selected_motion_is_tested_on_separate_simulations() {
     let scenario = assumed();
     let first = measured(&scenario.motion, 1);
