@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use stylet_diagnose::Diagnosis;
 use stylet_report::pages::diagnosis::{
     findings, general_forms, lower_limits, partial_model, recording_differences, summary_sentence,
+    undetermined_parameters,
 };
 use stylet_report::significant;
 
@@ -57,6 +58,9 @@ pub fn summary(d: &Diagnosis) -> String {
         let _ = writeln!(out, "  {sentence}");
     }
     for sentence in lower_limits(d) {
+        let _ = writeln!(out, "  {sentence}");
+    }
+    if let Some(sentence) = undetermined_parameters(d) {
         let _ = writeln!(out, "  {sentence}");
     }
     if let Some(differ) = recording_differences(d) {

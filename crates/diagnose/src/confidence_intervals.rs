@@ -37,10 +37,10 @@ const INFINITE_FREEDOM: f64 = 1e4;
 
 /// Covariance of the parameters at an optimum.
 pub struct Covariance<'a> {
-    fit: &'a Fit,
-    tangent: Linearization,
+    pub(crate) fit: &'a Fit,
+    pub(crate) tangent: Linearization,
     matrix: SymmetricMatrix,
-    factor: CholeskyFactor,
+    pub(crate) factor: CholeskyFactor,
     /// The same with one variance of a random effect increased, and its degrees of freedom.
     with_increased_variance: Vec<(CholeskyFactor, f64)>,
     /// Factors under bootstrap estimates of the noise.
@@ -164,8 +164,13 @@ impl<'a> Covariance<'a> {
         nats.reduce(f64::max)
     }
 
+    /// Index of a shared parameter in the covariance; `None` when it is not free.
+    pub(crate) fn index_of(&self, role: ParameterRole) -> Option<usize> {
+        self.tangent.shared.iter().position(|n| n.role == role)
+    }
+
     /// Gradient of a parameter of an effect with respect to the fitted parameters.
-    fn gradient(&self, effect: usize, parameter: usize) -> Vec<f64> {
+    pub(crate) fn gradient(&self, effect: usize, parameter: usize) -> Vec<f64> {
         let value = self.fit.model.effects[effect].values[parameter];
         let mut gradient = vec![0.0; self.tangent.normal_matrix.size];
         for (i, n) in self.tangent.shared.iter().enumerate() {
@@ -184,7 +189,7 @@ impl<'a> Covariance<'a> {
     /// free.
     #[must_use]
     pub fn shared_parameter(&self, role: ParameterRole) -> Option<(f64, f64)> {
-        let i = self.tangent.shared.iter().position(|n| n.role == role)?;
+        let i = self.index_of(role)?;
         let mut unit = vec![0.0; self.tangent.normal_matrix.size];
         unit[i] = 1.0;
         let half = self.half_width(&unit);
@@ -263,7 +268,7 @@ impl<'a> Covariance<'a> {
 }
 
 /// Loss in nats at the end of a 95 % interval.
-fn interval_end_nats() -> f64 {
+pub(crate) fn interval_end_nats() -> f64 {
     0.5 * normal::quantile(UPPER_PROBABILITY).powi(2)
 }
 

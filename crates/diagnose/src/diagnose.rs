@@ -201,6 +201,7 @@ pub(crate) fn diagnose_given_layers(
         data_quality
             .extend(notes.into_iter().map(|note| DataQualityNote { recording: r.name.clone(), note }));
     }
+    let (parameters, covariance) = labels_of_causes(assessment.labels, &causes);
     let mut diagnosis = Diagnosis {
         verdict,
         agrees: false,
@@ -208,6 +209,8 @@ pub(crate) fn diagnose_given_layers(
         partial,
         advice: advice(&causes, &not_identifiable, common_motion_period_s(&search.data)),
         base_parameters: assessment.base_parameters,
+        parameters,
+        covariance,
         not_identifiable,
         gain,
         negligible,
@@ -235,6 +238,19 @@ pub(crate) fn diagnose_given_layers(
         base_held_out,
         extended_held_out,
     })
+}
+
+/// Labels and covariance without the effects that are no causes.
+fn labels_of_causes(
+    (labels, covariance): (Vec<LabelledParameter>, Vec<Vec<f64>>),
+    causes: &[Cause],
+) -> (Vec<LabelledParameter>, Vec<Vec<f64>>) {
+    let is_kept =
+        |l: &LabelledParameter| l.effect.as_ref().is_none_or(|e| causes.iter().any(|c| c.effect == *e));
+    let kept: Vec<bool> = labels.iter().map(is_kept).collect();
+    let chosen = |row: Vec<f64>| row.into_iter().zip(&kept).filter(|(_, k)| **k).map(|(x, _)| x).collect();
+    let rows = covariance.into_iter().zip(&kept).filter(|(_, k)| **k).map(|(row, _)| chosen(row));
+    (labels.into_iter().filter(is_kept).collect(), rows.collect())
 }
 
 /// Prior of a scenario: its tissue, effects and tolerances.

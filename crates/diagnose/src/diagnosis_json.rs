@@ -97,6 +97,59 @@ pub struct BaseParameter {
     pub out_of_tolerance: bool,
 }
 
+/// What the recordings say about a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ParameterLabel {
+    /// The data bound it on both sides.
+    Determined,
+    /// The data bound it on one side.
+    OneSided,
+    /// The data do not bound it: the estimate is that of the prior.
+    NotIdentifiable,
+    /// Known to no better than 10 %, and only together with another parameter.
+    TradesWith,
+    /// It stands at a bound of the search.
+    AtBound,
+}
+
+/// A parameter of the base law or of a cause, with what the recordings say about it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LabelledParameter {
+    /// Layer, 1-based; 0 for the whole tissue and for effects.
+    pub layer: usize,
+    /// Effect that it belongs to; `None` for the base law.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub effect: Option<String>,
+    /// Name, or path in the effect.
+    pub name: String,
+    /// What the recordings say about it.
+    pub label: ParameterLabel,
+    /// The parameter whose estimate it correlates with most, by 0.9 or more.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trades_with: Option<String>,
+    /// That correlation, -1 to 1; 0 without such a parameter.
+    #[serde(default)]
+    pub correlation: f64,
+}
+
+impl LabelledParameter {
+    pub(crate) fn new(layer: usize, effect: Option<&str>, name: &str, label: ParameterLabel) -> Self {
+        let (effect, name) = (effect.map(str::to_owned), name.to_owned());
+        Self { layer, effect, name, label, trades_with: None, correlation: 0.0 }
+    }
+}
+
+impl std::fmt::Display for LabelledParameter {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match (&self.effect, self.layer) {
+            (Some(effect), _) => write!(f, "{} of {effect}", self.name),
+            (None, 0) => write!(f, "{}", self.name),
+            (None, layer) => write!(f, "{} of layer {layer}", self.name),
+        }
+    }
+}
+
 /// Improvement of the prediction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gain {
@@ -254,6 +307,12 @@ pub struct Diagnosis {
     pub causes: Vec<Cause>,
     /// Parameters of the base law as fitted.
     pub base_parameters: Vec<BaseParameter>,
+    /// What the recordings say about each parameter of the base law and of the causes.
+    #[serde(default)]
+    pub parameters: Vec<LabelledParameter>,
+    /// Covariance of these parameters, in their order and units.
+    #[serde(default)]
+    pub covariance: Vec<Vec<f64>>,
     /// Effects that are not identifiable from these recordings.
     pub not_identifiable: Vec<String>,
     /// Improvement of the prediction.

@@ -51,6 +51,7 @@ mod model_pruning;
 mod motion_period;
 pub mod negligible_effects;
 mod outlier_segment_test;
+mod parameter_labels;
 mod partial_model;
 pub mod prediction;
 pub mod random_effect_selection;

@@ -2,11 +2,14 @@
 
 use crate::competing_effects::{CompetingEffect, EQUIVALENCE_NATS};
 use crate::confidence_intervals::{Covariance, release_unreached_punctures};
-use crate::diagnosis_json::{BaseParameter, Cause, NegligibleEffect, ResidualStructureReport};
+use crate::diagnosis_json::{
+    BaseParameter, Cause, LabelledParameter, NegligibleEffect, ResidualStructureReport,
+};
 use crate::geometry_selection::free_geometry;
 use crate::held_out::JackknifeResult;
 use crate::negligible_effects::Negligible;
 use crate::outlier_segment_test::outlier_segment_p_value;
+use crate::parameter_labels::label_parameters;
 use crate::residual_tests::test_residuals;
 use crate::selection_state::Search;
 use crate::tone_detection::{detect_tones, with_noise_without_tones};
@@ -62,6 +65,8 @@ pub(crate) struct Assessment {
     /// Nats against zero strength of each effect.
     pub nats_against_zero: Vec<(String, f64)>,
     pub base_parameters: Vec<BaseParameter>,
+    /// What the recordings say about each parameter, and the covariance of the estimates.
+    pub labels: (Vec<LabelledParameter>, Vec<Vec<f64>>),
     pub residual_structure: ResidualStructureReport,
     pub unknown: bool,
     /// Whether the residual has tones.
@@ -177,6 +182,7 @@ pub(crate) fn assess_search(search: &mut Search, competing: &[Vec<CompetingEffec
         });
     }
     let base_parameters = base_parameters(search, &covariance);
+    let labels = label_parameters(&covariance, &slow_data, &base_parameters, &causes);
     causes.sort_by(|a, b| b.gain_nats.total_cmp(&a.gain_nats));
     let mut depends_on: Vec<String> = structure.depends_on.iter().map(|d| d.0.clone()).collect();
     if has_tones {
@@ -204,7 +210,7 @@ pub(crate) fn assess_search(search: &mut Search, competing: &[Vec<CompetingEffec
         }
         search.data = without_tones;
     }
-    Assessment { causes, nats_against_zero, base_parameters, residual_structure, unknown, has_tones }
+    Assessment { causes, nats_against_zero, base_parameters, labels, residual_structure, unknown, has_tones }
 }
 
 /// Varying-coefficient test of all effects: the effect with the largest gain, if it imitates an unmodelled one.

@@ -117,6 +117,14 @@ impl CholeskyFactor {
         x
     }
 
+    /// `L y`: maps independent variables of unit variance to variables of covariance `A`.
+    #[must_use]
+    pub fn multiply(&self, y: &[f64]) -> Vec<f64> {
+        let row =
+            |i: usize| (0..=i).filter(|k| self.kept[*k]).map(|k| self.l[i * self.size + k] * y[k]).sum();
+        (0..self.size).map(row).collect()
+    }
+
     /// Diagonal of the inverse; infinite for rows that were left out.
     #[must_use]
     pub fn inverse_diagonal(&self) -> Vec<f64> {

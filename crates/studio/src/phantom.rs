@@ -194,7 +194,9 @@ fn from_recording(
     let trace = look::corrected_trace(algorithm, &run, corrections, recording);
     let found = found_layers(&trace, recording);
     let found = found.filter(|found| !found.is_empty()).ok_or_else(|| {
-        Problem::new("no layer was found in this recording, so there is nothing to start from; see its findings")
+        Problem::new(
+            "no layer was found in this recording, so there is nothing to start from; see its findings",
+        )
     })?;
     let mut layers: Vec<Layer> = found.iter().enumerate().map(layer).collect();
     let deepest = recording.samples().enumerate().max_by(|a, b| a.1.position_m.total_cmp(&b.1.position_m));

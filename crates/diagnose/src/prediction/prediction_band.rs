@@ -1,6 +1,6 @@
 //! Prediction band of a new recording.
 
-use crate::diagnosis_json::{Diagnosis, Estimate, RandomEffectSd};
+use crate::diagnosis_json::{Diagnosis, Estimate, LabelledParameter, ParameterLabel, RandomEffectSd};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -8,6 +8,7 @@ use std::sync::Arc;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::likelihood::{FitData, replay};
 use stylet_identify::model::{Assumptions, Model};
+use stylet_stats::linear_algebra::{CholeskyFactor, SymmetricMatrix};
 use stylet_stats::order_statistics::quantile_of_sorted;
 use stylet_tissue::{AnyEffect, Effect};
 
@@ -29,19 +30,38 @@ pub struct Uncertainty {
     pub block_n: f64,
     /// Random effects between recordings.
     differences: RandomEffectSd,
-    /// Relative standard deviations per layer: stiffness, friction, puncture force.
-    base: Vec<[f64; 3]>,
-    /// Standard deviations in m: thickness per layer, then the surface.
-    thickness_m: Vec<f64>,
-    surface_m: f64,
-    /// Standard deviations of effect parameters, by effect and path.
-    effects: Vec<(String, String, f64)>,
+    /// Parameters of base law and causes.
+    parameters: Vec<LabelledParameter>,
+    /// Cholesky factor of their covariance.
+    factor: CholeskyFactor,
     /// Whether it comes from a diagnosis.
     from_diagnosis: bool,
 }
 
-fn interval_sd(low: f64, high: f64) -> f64 {
-    ((high - low) / (2.0 * stylet_stats::Z95)).max(0.0)
+/// Parameters of a diagnosis with their covariance; without one, their intervals count as independent.
+fn parameters_of(d: &Diagnosis) -> (Vec<LabelledParameter>, SymmetricMatrix) {
+    let is_square = d.covariance.len() == d.parameters.len()
+        && d.covariance.iter().all(|row| row.len() == d.parameters.len());
+    if is_square && !d.parameters.is_empty() {
+        let mut matrix = SymmetricMatrix::zeros(d.parameters.len());
+        for (i, row) in d.covariance.iter().enumerate() {
+            row[..=i].iter().enumerate().for_each(|(j, x)| matrix.add(i, j, *x));
+        }
+        return (d.parameters.clone(), matrix);
+    }
+    let of_base = d.base_parameters.iter().map(|b| (b.layer, None, b.name.as_str(), b.high - b.low));
+    let of_causes = d.causes.iter().flat_map(|c| {
+        let of_cause = |(path, e): (_, &Estimate)| (0, Some(c.effect.as_str()), path, e.high - e.low);
+        c.parameters.iter().map(move |(path, e)| of_cause((path.as_str(), e)))
+    });
+    let all: Vec<_> = of_base.chain(of_causes).collect();
+    let mut matrix = SymmetricMatrix::zeros(all.len());
+    for (i, (.., width)) in all.iter().enumerate() {
+        matrix.add(i, i, (width / (2.0 * stylet_stats::Z95)).max(0.0).powi(2));
+    }
+    let parameter =
+        |(layer, effect, name, _)| LabelledParameter::new(layer, effect, name, ParameterLabel::Determined);
+    (all.into_iter().map(parameter).collect(), matrix)
 }
 
 impl Uncertainty {
@@ -54,10 +74,8 @@ impl Uncertainty {
             floor_n: 0.0,
             block_n: crate::base_law_fit::roughness(blocks),
             differences: RandomEffectSd::default(),
-            base: Vec::new(),
-            thickness_m: Vec::new(),
-            surface_m: 0.0,
-            effects: Vec::new(),
+            parameters: Vec::new(),
+            factor: SymmetricMatrix::zeros(0).cholesky(),
             from_diagnosis: diagnosis.is_some(),
         };
         let Some(d) = diagnosis else {
@@ -69,25 +87,8 @@ impl Uncertainty {
         let square = known.floor_n.powi(2);
         known.block_n = (square - within).max(square / samples.max(1.0)).sqrt();
         known.differences = d.random_effect_sd;
-        let layers = d.base_parameters.iter().map(|b| b.layer).max().unwrap_or(0);
-        known.base = vec![[0.0; 3]; layers];
-        known.thickness_m = vec![0.0; layers];
-        for b in &d.base_parameters {
-            let sd = interval_sd(b.low, b.high);
-            let relative = sd / b.value.abs().max(1e-300);
-            match (b.layer, b.name.as_str()) {
-                (0, _) => known.surface_m = sd,
-                (l, "stiffness_n_per_m") => known.base[l - 1][0] = relative,
-                (l, "friction_ns_per_m2") => known.base[l - 1][1] = relative,
-                (l, "puncture_n") => known.base[l - 1][2] = relative,
-                (l, _) => known.thickness_m[l - 1] = sd,
-            }
-        }
-        for c in &d.causes {
-            for (path, Estimate { low, high, .. }) in &c.parameters {
-                known.effects.push((c.effect.clone(), path.clone(), interval_sd(*low, *high)));
-            }
-        }
+        let (parameters, covariance) = parameters_of(d);
+        (known.parameters, known.factor) = (parameters, covariance.cholesky());
         known
     }
 
@@ -112,44 +113,52 @@ impl Uncertainty {
         out
     }
 
-    /// A draw of the next recording's model. Parameters are drawn independently, because `diagnosis.json`
-    /// has no correlations.
+    /// A draw of the next recording's model.
     fn draw(&self, model: &Model, r: usize, rng: &mut ChaCha8Rng) -> Model {
         let mut normal = || -> f64 { StandardNormal.sample(rng) };
         let mut out = model.clone();
-        let tissue = &mut out.tissue;
-        tissue.surface_m += self.surface_m * normal();
-        for (l, layer) in tissue.layers.iter_mut().enumerate() {
-            let [k, b, f] = self.base.get(l).copied().unwrap_or_default();
-            layer.stiffness_n_per_m *= (1.0 + k * normal()).max(0.0);
-            layer.friction_ns_per_m2 *= (1.0 + b * normal()).max(0.0);
-            let factor = (1.0 + f * normal()) * (1.0 + self.differences.puncture * normal());
+        let independent: Vec<f64> = self.parameters.iter().map(|_| normal()).collect();
+        let deviations = self.factor.multiply(&independent);
+        let mut effects = model.assumed.known_effects.clone();
+        for (p, deviation) in self.parameters.iter().zip(&deviations) {
+            if let Some(id) = &p.effect {
+                effects.iter_mut().filter(|e| e.id() == id).for_each(|e| deviate(e, &p.name, *deviation));
+            } else if p.layer == 0 {
+                out.tissue.surface_m += deviation;
+            } else if let Some(layer) = out.tissue.layers.get_mut(p.layer - 1) {
+                let positive = |x: f64, least: f64| (x + deviation).max(least * x);
+                match p.name.as_str() {
+                    "stiffness_n_per_m" => layer.stiffness_n_per_m = positive(layer.stiffness_n_per_m, 0.0),
+                    "friction_ns_per_m2" => {
+                        layer.friction_ns_per_m2 = positive(layer.friction_ns_per_m2, 0.0)
+                    }
+                    "puncture_n" => layer.puncture_n = layer.puncture_n.map(|x| positive(x, 0.01)),
+                    _ => layer.thickness_m = positive(layer.thickness_m, 0.05),
+                }
+            }
+        }
+        for layer in &mut out.tissue.layers {
+            let factor = 1.0 + self.differences.puncture * normal();
             layer.puncture_n = layer.puncture_n.map(|f| f * factor.max(0.01));
-            let moved = self.thickness_m.get(l).copied().unwrap_or(0.0) * normal()
-                + self.differences.rupture_depth_m * normal();
-            layer.thickness_m = (layer.thickness_m + moved).max(0.05 * layer.thickness_m);
+            let moved_m = self.differences.rupture_depth_m * normal();
+            layer.thickness_m = (layer.thickness_m + moved_m).max(0.05 * layer.thickness_m);
         }
         out.per_recording[r].surface_m += self.differences.surface_m * normal();
         out.per_recording[r].ln_friction += self.differences.friction * normal();
-        if !self.effects.is_empty() {
-            let given = model.assumed.known_effects.iter().map(|e| {
-                let info = e.info();
-                let mut values = e.parameters();
-                for (value, p) in values.iter_mut().zip(info.parameters) {
-                    let known =
-                        self.effects.iter().find(|(effect, path, _)| effect == info.id && path == p.path);
-                    if let Some((_, _, sd)) = known.filter(|_| !p.integer) {
-                        *value = (*value + sd * normal()).clamp(p.low, p.high);
-                    }
-                }
-                AnyEffect::from_parameters(info.id, &values).unwrap_or_else(|| e.clone())
-            });
-            out.assumed = Arc::new(Assumptions {
-                known_effects: given.collect(),
-                ..Assumptions::clone(&model.assumed)
-            });
-        }
+        out.assumed = Arc::new(Assumptions { known_effects: effects, ..Assumptions::clone(&model.assumed) });
         out
+    }
+}
+
+/// Changes a parameter of an effect, within its range.
+fn deviate(effect: &mut AnyEffect, path: &str, deviation: f64) {
+    let info = effect.info();
+    let mut values = effect.parameters();
+    for (value, p) in values.iter_mut().zip(info.parameters).filter(|(_, p)| p.path == path && !p.integer) {
+        *value = (*value + deviation).clamp(p.low, p.high);
+    }
+    if let Some(changed) = AnyEffect::from_parameters(info.id, &values) {
+        *effect = changed;
     }
 }
 

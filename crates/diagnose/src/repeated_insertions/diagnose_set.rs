@@ -211,6 +211,8 @@ fn diagnosis(
         partial: None,
         causes,
         base_parameters: base_parameters(&estimates, assumed),
+        parameters: Vec::new(),
+        covariance: Vec::new(),
         not_identifiable: unidentified_effects(best, recordings),
         gain: Gain {
             held_out: true,

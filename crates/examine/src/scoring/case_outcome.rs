@@ -26,6 +26,9 @@ pub struct ScoredParameter {
     pub high: Option<f64>,
     /// Whether the 95 % interval holds the truth; none without an interval.
     pub held: Option<bool>,
+    /// How well it is known, as the answer says.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub label: Option<String>,
 }
 
 /// What came of one case.
@@ -156,13 +159,15 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
             } else {
                 0.0
             };
-            out.push(number(
+            let mut scored = number(
                 format!("{}.{path}", effect.id()),
                 truth,
                 e.value + turn,
                 e.low.map(|x| x + turn),
                 e.high.map(|x| x + turn),
-            ));
+            );
+            scored.label = answer.label(0, Some(effect.id()), &path);
+            out.push(scored);
         }
     }
     let truth = &case.setup.truth;
@@ -183,7 +188,9 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
             _ => None,
         };
         if let Some(value) = value {
-            out.push(number(format!("base.{}", p.name), value, p.value, p.low, p.high));
+            let mut scored = number(format!("base.{}", p.name), value, p.value, p.low, p.high);
+            scored.label = answer.label(p.layer, None, &p.name);
+            out.push(scored);
         }
     }
     out
@@ -191,7 +198,7 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
 
 fn number(name: String, truth: f64, value: f64, low: Option<f64>, high: Option<f64>) -> ScoredParameter {
     let held = low.zip(high).map(|(low, high)| low <= truth && truth <= high);
-    ScoredParameter { name, truth, value, low, high, held }
+    ScoredParameter { name, truth, value, low, high, held, label: None }
 }
 
 #[cfg(test)]

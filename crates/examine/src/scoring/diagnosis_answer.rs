@@ -50,6 +50,21 @@ pub struct BaseParameter {
     pub high: Option<f64>,
 }
 
+/// What an answer says about how well a parameter is known.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LabelledParameter {
+    /// Layer, 1-based; 0 for the surface and for effects.
+    #[serde(default)]
+    pub layer: usize,
+    /// Effect that it belongs to; `None` for the base law.
+    #[serde(default)]
+    pub effect: Option<String>,
+    /// Field of the layer, or path in the effect.
+    pub name: String,
+    /// The label.
+    pub label: String,
+}
+
 /// An effect too small to matter: never counted as a cause.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NegligibleEffect {
@@ -90,6 +105,9 @@ pub struct Answer {
     /// Base parameters.
     #[serde(default)]
     pub base_parameters: Vec<BaseParameter>,
+    /// How well parameters are known.
+    #[serde(default)]
+    pub parameters: Vec<LabelledParameter>,
     /// Effects that these recordings cannot show.
     #[serde(default)]
     pub not_identifiable: Vec<String>,
@@ -105,6 +123,14 @@ impl Answer {
         self.base_parameters.iter().map(|p| p.layer).max().unwrap_or(0)
     }
 
+    /// Label of a parameter, if it has one.
+    #[must_use]
+    pub fn label(&self, layer: usize, effect: Option<&str>, name: &str) -> Option<String> {
+        let is_it =
+            |p: &&LabelledParameter| p.layer == layer && p.effect.as_deref() == effect && p.name == name;
+        self.parameters.iter().find(is_it).map(|p| p.label.clone())
+    }
+
     /// "Nothing is wrong."
     #[must_use]
     pub fn none() -> Self {
@@ -112,6 +138,7 @@ impl Answer {
             verdict: Verdict::None,
             causes: Vec::new(),
             base_parameters: Vec::new(),
+            parameters: Vec::new(),
             not_identifiable: Vec::new(),
             negligible: Vec::new(),
         }

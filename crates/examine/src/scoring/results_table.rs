@@ -109,6 +109,7 @@ pub fn results_text(outcomes: &[CaseOutcome]) -> String {
     together(&mut out, outcomes);
     said(&mut out, outcomes);
     held(&mut out, outcomes);
+    labelled(&mut out, outcomes);
     confident(&mut out, outcomes);
     let failed: Vec<&CaseOutcome> = outcomes.iter().filter(|o| o.failed.is_some()).collect();
     if let Some(first) = failed.first() {
@@ -183,6 +184,28 @@ fn held(out: &mut String, outcomes: &[CaseOutcome]) {
     for (name, held) in &by {
         let rate = SuccessRate::of(held, |h| **h);
         let _ = writeln!(out, "    {name:<52}{rate}");
+    }
+}
+
+/// How often 95 % intervals hold the truth, and how often they are within 10 % of the value, by what the answer says about the parameter.
+fn labelled(out: &mut String, outcomes: &[CaseOutcome]) {
+    /// Half width of an interval, relative to the value, that tells a parameter.
+    const TELLS: f64 = 0.1;
+    let mut by: BTreeMap<&str, Vec<(bool, bool)>> = BTreeMap::new();
+    for n in outcomes.iter().flat_map(|o| &o.numbers) {
+        if let (Some(label), Some(held), Some((low, high))) = (&n.label, n.held, n.low.zip(n.high)) {
+            by.entry(label).or_default().push((held, high - low <= 2.0 * TELLS * n.value.abs()));
+        }
+    }
+    if !by.is_empty() {
+        let _ = writeln!(
+            out,
+            "\nparameters by label: 95 % interval holds the truth; is within 10 % of the value"
+        );
+    }
+    for (label, all) in &by {
+        let [held, told] = [SuccessRate::of(all, |(held, _)| *held), SuccessRate::of(all, |(_, told)| *told)];
+        let _ = writeln!(out, "    {label:<24}{held:<28}{told}");
     }
 }
 

@@ -104,14 +104,9 @@ pub(super) fn damped_step(
     Some(delta)
 }
 
-/// The model after a share of a step.
-pub(super) fn apply_step(
-    model: &Model,
-    data: &FitData,
-    t: &Linearization,
-    delta: &[f64],
-    share: f64,
-) -> Model {
+/// The model after a share of a step, within the bounds of the parameters.
+#[must_use]
+pub fn apply_step(model: &Model, data: &FitData, t: &Linearization, delta: &[f64], share: f64) -> Model {
     let mut next = model.clone();
     for (n, d) in t.shared.iter().zip(delta) {
         next.set(n.role, 0, (model.get(n.role, 0) + share * d).clamp(n.low, n.high));

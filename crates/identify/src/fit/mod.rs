@@ -15,13 +15,14 @@ mod scatter_update;
 #[cfg(test)]
 mod tests;
 
+pub use damped_step::apply_step;
 pub use jacobian_column::JacobianColumn;
 pub use linearization::Linearization;
 pub use nonsmooth::fit_nonsmooth;
 
 use crate::likelihood::{FitData, Residuals, residuals};
 use crate::model::Model;
-use damped_step::{apply_step, clamp_to_bounds, damped_step, extrapolation_factor};
+use damped_step::{clamp_to_bounds, damped_step, extrapolation_factor};
 use scatter_update::update_scatter;
 
 /// A fitted model.

@@ -57,6 +57,8 @@ impl SpecimenReport {
             verdict: if causes.is_empty() { Verdict::None } else { Verdict::Named },
             causes,
             base_parameters: Vec::new(),
+            parameters: Vec::new(),
+            covariance: Vec::new(),
             not_identifiable: unidentifiable_effects(),
             gain: Gain {
                 held_out: true,

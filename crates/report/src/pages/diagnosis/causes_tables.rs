@@ -1,11 +1,11 @@
 //! Tables of the causes, the re-fitted base parameters, negligible effects and effects that cannot be identified.
 
+use super::parameter_labels::label_cell;
 use super::summary_sentence::lower_limit;
 use crate::page_model::{Cell, Section, Status, Table};
 use crate::pages::formatting::BASE_LAW_EQUATIONS;
 use std::fmt::Write as _;
 use stylet_diagnose::diagnosis_json::{BaseParameter, Diagnosis, Verdict};
-use stylet_scenario::Scenario;
 use stylet_stats::number_format::significant;
 
 /// The causes with their parameters, and the extended law in the notation of docs/reference/model.md.
@@ -41,6 +41,7 @@ pub(super) fn causes(d: &Diagnosis) -> Section {
                     if c.at_bound.contains(path) { ", at its bound" } else { "" }
                 )),
                 Cell::number(format!("{} to {}", number(e.low), number(e.high))),
+                label_cell(d, 0, Some(&c.effect), path),
             ]);
         }
     }
@@ -60,12 +61,13 @@ pub(super) fn causes(d: &Diagnosis) -> Section {
         "parameter",
         "value",
         "95 % interval",
+        "by these recordings",
     ];
     section.table(Table::new(title, &headers, rows)).code("equation", text)
 }
 
 /// Fitted base parameters, those that changed first.
-pub(super) fn base_parameters(scenario: &Scenario, d: &Diagnosis) -> Section {
+pub(super) fn base_parameters(d: &Diagnosis) -> Section {
     let mut order: Vec<&BaseParameter> = d.base_parameters.iter().collect();
     order.sort_by_key(|b| (!b.changed, !b.at_bound));
     let count = order.iter().filter(|b| b.changed).count();
@@ -88,6 +90,7 @@ pub(super) fn base_parameters(scenario: &Scenario, d: &Diagnosis) -> Section {
                     format!("{} to {}", number(b.low), number(b.high))
                 }),
                 Cell::number(change(b)).status(status),
+                label_cell(d, b.layer, None, &b.name),
             ]
         })
         .collect();
@@ -96,7 +99,7 @@ pub(super) fn base_parameters(scenario: &Scenario, d: &Diagnosis) -> Section {
             "{count} of {} differ from the assumed value by more than their interval",
             d.base_parameters.len()
         ),
-        &["", "parameter", "assumed", "fitted", "95 % interval", "change"],
+        &["", "parameter", "assumed", "fitted", "95 % interval", "change", "by these recordings"],
         rows,
     ));
     let mut warnings = Vec::new();
@@ -107,30 +110,11 @@ pub(super) fn base_parameters(scenario: &Scenario, d: &Diagnosis) -> Section {
             if bounds == 1 { " is" } else { "s are" }
         ));
     }
-    let tolerance = |b: &BaseParameter| match b.name.as_str() {
-        "surface_m" => scenario.surface_tolerance_m,
-        "thickness_m" => scenario.thickness_tolerance * b.assumed,
-        _ => scenario.tolerance * b.assumed,
-    };
-    let unconstrained: Vec<String> = order
-        .iter()
-        .filter(|b| b.high - b.low > PRIOR_SHARE * 2.0 * 1.96 * tolerance(b) && tolerance(b) > 0.0)
-        .map(|b| format!("{} of layer {}", b.name, b.layer))
-        .collect();
-    if !unconstrained.is_empty() {
-        warnings.push(format!(
-            "These recordings hardly constrain {}: the interval is that of the prior.",
-            unconstrained.join(", ")
-        ));
-    }
     if !warnings.is_empty() {
         section = section.warnings(warnings);
     }
     section
 }
-
-/// A posterior interval of at least this share of the prior's counts as unconstrained by the data.
-const PRIOR_SHARE: f64 = 0.8;
 
 /// Change of a re-fitted parameter from its assumed value, and whether it is at a bound.
 fn change(b: &BaseParameter) -> String {

@@ -2,9 +2,11 @@
 
 mod causes_tables;
 mod effect_search_steps;
+mod parameter_labels;
 mod residual_charts;
 mod summary_sentence;
 
+pub use parameter_labels::undetermined_parameters;
 pub use summary_sentence::{
     findings, general_forms, lower_limits, partial_model, recording_differences, summary_sentence,
 };
@@ -41,7 +43,8 @@ pub fn page(scenario: &Scenario, file: &str, command: String, examined: &Diagnos
         .section(verdict(d))
         .section(assumptions(scenario, d, &all))
         .section(causes(d))
-        .section(base_parameters(scenario, d))
+        .section(base_parameters(d))
+        .section(parameter_labels::correlations(d))
         .section(negligible_effects(d))
         .section(not_identifiable(d))
         .section(remaining_structure(d, &all))
@@ -115,7 +118,8 @@ fn verdict(d: &Diagnosis) -> Section {
         .status(status),
     );
     let mut section = Section::new("Verdict").tiles(tiles);
-    let warnings: Vec<String> = findings(d).into_iter().chain(partial_model(d)).collect();
+    let warnings: Vec<String> =
+        findings(d).into_iter().chain(partial_model(d)).chain(undetermined_parameters(d)).collect();
     if !warnings.is_empty() {
         section = section.warnings(warnings);
     }

@@ -1,0 +1,83 @@
+//! What the recordings say about each parameter, and how the estimates correlate.
+
+use crate::page_model::{Cell, Section, Status};
+use crate::svg::{FigureOptions, HeatMap, heat_map};
+use stylet_diagnose::diagnosis_json::{Diagnosis, LabelledParameter, ParameterLabel};
+use stylet_stats::number_format::significant;
+
+/// Parameters that these recordings do not determine, in one sentence. Those at their bounds and puncture forces that were never reached
+/// have sentences of their own.
+#[must_use]
+pub fn undetermined_parameters(d: &Diagnosis) -> Option<String> {
+    let has_own_sentence = |p: &&LabelledParameter| {
+        p.label == ParameterLabel::AtBound
+            || d.base_parameters.iter().any(|b| b.at_least && b.layer == p.layer && b.name == p.name)
+    };
+    let open = d.parameters.iter().filter(|p| p.label != ParameterLabel::Determined);
+    let words: Vec<String> =
+        open.filter(|p| !has_own_sentence(p)).map(|p| format!("{p} ({})", in_words(p))).collect();
+    (!words.is_empty()).then(|| format!("these recordings do not determine {}", words.join(", ")))
+}
+
+/// The label in words.
+fn in_words(p: &LabelledParameter) -> String {
+    match (p.label, &p.trades_with) {
+        (ParameterLabel::Determined, _) => "determined".to_owned(),
+        (ParameterLabel::OneSided, _) => "bounded on one side only".to_owned(),
+        (ParameterLabel::NotIdentifiable, _) => "not identifiable".to_owned(),
+        (ParameterLabel::AtBound, _) => "at its bound".to_owned(),
+        (ParameterLabel::TradesWith, Some(partner)) => {
+            format!("trades with {partner}, correlation {}", significant(p.correlation, 2))
+        }
+        (ParameterLabel::TradesWith, None) => "trades with others".to_owned(),
+    }
+}
+
+/// A table's cell with the label; empty for a parameter without one.
+pub(super) fn label_cell(d: &Diagnosis, layer: usize, effect: Option<&str>, name: &str) -> Cell {
+    let is_it = |p: &&LabelledParameter| p.layer == layer && p.effect.as_deref() == effect && p.name == name;
+    let Some(p) = d.parameters.iter().find(is_it) else { return Cell::text("") };
+    let status = if p.label == ParameterLabel::Determined { Status::Plain } else { Status::Warn };
+    Cell::text(in_words(p)).status(status)
+}
+
+/// Heat map of the correlations between the estimates; nothing for fewer than two.
+pub(super) fn correlations(d: &Diagnosis) -> Section {
+    let section = Section::new("Correlations of the estimates");
+    let n = d.parameters.len();
+    if n < 2 || d.covariance.len() != n {
+        return section.text("Fewer than two parameters are free.");
+    }
+    let correlation = |i: usize, j: usize| {
+        let r = d.covariance[i][j] / (d.covariance[i][i] * d.covariance[j][j]).sqrt();
+        if i == j { f64::NAN } else { r.abs() }
+    };
+    let names: Vec<String> = d.parameters.iter().map(short_name).collect();
+    let map = HeatMap {
+        row_label: String::new(),
+        column_label: "absolute correlation in per cent".to_owned(),
+        rows: names.clone(),
+        columns: names,
+        values: (0..n).map(|i| (0..n).map(|j| correlation(i, j)).collect()).collect(),
+        values_are_fractions: true,
+    };
+    let options = FigureOptions {
+        title: "Which estimates trade with one another".to_owned(),
+        subtitle: "dark pairs: only a combination of the two is known well".to_owned(),
+        width_px: 1200.0,
+    };
+    section.picture("Correlations between the estimated parameters", heat_map(&map, &options))
+}
+
+/// Name of a parameter in the notation of docs/reference/model.md.
+fn short_name(p: &LabelledParameter) -> String {
+    let symbol = match (p.effect.as_deref(), p.name.as_str()) {
+        (Some(_), path) => return path.to_owned(),
+        (None, "stiffness_n_per_m") => "K",
+        (None, "friction_ns_per_m2") => "b",
+        (None, "puncture_n") => "F",
+        (None, "thickness_m") => "d",
+        (None, _) => return "surface".to_owned(),
+    };
+    format!("{symbol} {}", p.layer)
+}
