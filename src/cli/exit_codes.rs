@@ -27,6 +27,9 @@ pub enum Failure {
     /// The request cannot be fulfilled with these inputs; the message gives reason and remedy.
     #[error("{0}")]
     Check(String),
+    /// A diagnosis of these recordings would mean nothing.
+    #[error("a diagnosis of these recordings would mean nothing: {0}")]
+    Unusable(String),
     /// Bounds of a gate do not hold.
     #[error("{failed} of {of} bounds do not hold")]
     Gate {
@@ -68,7 +71,7 @@ impl Failure {
         ExitCode::from(match self {
             Failure::Work(why) if matches!(**why, stylet_api::Error::Internal(_)) => INTERNAL,
             Failure::Work(_) | Failure::Stdout(_) | Failure::Check(_) => INPUT_WRONG,
-            Failure::Gate { .. } => CHECK_FAILED,
+            Failure::Gate { .. } | Failure::Unusable(_) => CHECK_FAILED,
         })
     }
 }

@@ -2,6 +2,7 @@
 
 mod args;
 mod benchmark;
+mod check;
 mod compare;
 mod convert;
 mod diagnose;
@@ -57,6 +58,7 @@ fn memory_limit(command: &Command) -> f64 {
     let limits = match command {
         Command::Run(args) => args.limits,
         Command::Enhance(args) => args.limits,
+        Command::Check(args) => args.limits,
         Command::Diagnose(args) => args.limits,
         Command::Identify(args) => args.limits,
         Command::Predict(args) => args.limits,
@@ -82,6 +84,7 @@ pub fn main() -> ExitCode {
         Command::Replay(args) => sweep::replay(args),
         Command::Gate(args) => sweep::gate(args),
         Command::Compare(args) => compare::compare(args),
+        Command::Check(args) => check::check(args),
         Command::Diagnose(args) => diagnose::diagnose(args),
         Command::Identify(args) => identify::identify(args),
         Command::Predict(args) => predict::predict(args),

@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | [`simulate`](fn@simulate) | [`Scenario`] | [`Run`]: recording, truth, outputs of the online algorithm, scores |
 //! | [`enhance`](fn@enhance) | [`Recording`] | [`AlgorithmRun`]: enhanced force, ruptures, layers |
+//! | [`check`] | assumed [`Scenario`] and recordings | [`CheckReport`]: what they can show |
 //! | [`diagnose`](fn@diagnose) | assumed [`Scenario`] and recordings | [`DiagnosisReport`]: causes, re-fitted scenario |
 //! | [`predict_recordings`] | model and held-out recordings | errors, noise, coverage of the band |
 //! | [`sweep`](fn@sweep) | [`Sweep`] | [`SweepResult`]: one row per insertion, summary |
@@ -17,6 +18,7 @@
 #![forbid(unsafe_code)]
 
 pub mod benchmark;
+mod check_experiment;
 pub mod compare_algorithms;
 mod diagnose;
 pub mod diagnose_repeats;
@@ -38,6 +40,7 @@ mod simulate;
 pub mod sweep;
 pub mod sweep_folder;
 
+pub use check_experiment::{CheckReport, check};
 pub use diagnose::{DiagnosisReport, diagnose, identify, predict_recordings};
 pub use diagnosis_inputs::{DiagnosisInputs, INPUTS_FILE, read_options, read_recordings, recording_name};
 pub use enhancement::{IdentifiedModel, enhance, enhance_as, enhance_with_model};

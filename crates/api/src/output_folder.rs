@@ -26,9 +26,10 @@ const COMPLETE: &str = ".stylet-set";
 const OLD: &str = ".stylet-old";
 
 /// The file by which the results of a command are recognised, and the command.
-const RESULT_FILES: [(&str, &str); 9] = [
+const RESULT_FILES: [(&str, &str); 10] = [
     ("score.json", "run"),
     ("enhance.json", "enhance"),
+    ("check.json", "check"),
     ("diagnosis.json", "diagnose"),
     ("predict.json", "predict"),
     ("identifiability.json", "identifiability"),

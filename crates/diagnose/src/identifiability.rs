@@ -10,7 +10,7 @@ use stylet_identify::score_test::ScoreTest;
 use stylet_tissue::{ChainStage, EffectInfo, FitScale, Proposal, general_effects};
 
 /// An effect of typical size that would gain less than this many nats is not identifiable.
-const MIN_DETECTABLE_NATS: f64 = 10.0;
+pub(crate) const MIN_DETECTABLE_NATS: f64 = 10.0;
 
 /// Effects that are not identifiable from these recordings, in the order of the library.
 #[must_use]
@@ -23,10 +23,18 @@ pub fn not_identifiable(best: &Fit, data: &FitData) -> Vec<String> {
 }
 
 fn is_identifiable(info: &'static EffectInfo, score_test: &ScoreTest) -> bool {
-    // At a multiple of the commanded motion a clock shows nothing of its own.
-    if has_clock(info) && common_motion_period_s(score_test.data).is_some() {
-        return false;
+    match typical_size(info, score_test) {
+        Some((_, nats)) => nats >= MIN_DETECTABLE_NATS,
+        // Free thicknesses absorb a shifted layer boundary.
+        None if matches!(info.proposal, Proposal::LayerFaces(_)) => !score_test.fit.model.free.thickness,
+        None => !has_clock(info) || common_motion_period_s(score_test.data).is_none(),
     }
+}
+
+/// Parameters of an effect at its typical size, and the nats that it would gain; the largest over its shapes. `None` for an effect
+/// without a column to test.
+pub(crate) fn typical_size(info: &'static EffectInfo, score_test: &ScoreTest) -> Option<(Vec<f64>, f64)> {
+    let start = || info.parameters.iter().map(|p| p.start).collect::<Vec<f64>>();
     let typical = |group: &[&[f64]]| -> Vec<f64> {
         info.parameters
             .iter()
@@ -34,24 +42,22 @@ fn is_identifiable(info: &'static EffectInfo, score_test: &ScoreTest) -> bool {
             .map(|(k, p)| if p.strength && p.fit_scale() == FitScale::Linear { p.start } else { group[0][k] })
             .collect()
     };
-    match info.proposal {
-        Proposal::LinearColumns(groups) => groups.iter().any(|g| {
-            let detectable = |values: &[f64]| {
-                let column = score_test.effect_column(&EffectTerm::new(info, values))?;
-                Some(score_test.gain(&[column]).detectable_nats)
-            };
-            detectable(&typical(g)).is_some_and(|nats| nats >= MIN_DETECTABLE_NATS)
-        }),
-        // Free thicknesses absorb a shifted layer boundary.
-        Proposal::LayerFaces(_) => !score_test.fit.model.free.thickness,
-        Proposal::TissueMotion | Proposal::SpectralTone | Proposal::MembraneRupture => {
-            let values: Vec<f64> = info.parameters.iter().map(|p| p.start).collect();
-            score_test
-                .effect_column(&EffectTerm::new(info, &values))
-                .is_some_and(|c| score_test.gain(&[c]).detectable_nats >= MIN_DETECTABLE_NATS)
+    let shapes = match info.proposal {
+        Proposal::LinearColumns(groups) => groups.iter().map(|g| typical(g)).collect(),
+        Proposal::TissueMotion | Proposal::SpectralTone | Proposal::MembraneRupture => vec![start()],
+        Proposal::LayerFaces(_) | Proposal::SplitTerm(_) | Proposal::RawSamples | Proposal::PerLayer => {
+            return None;
         }
-        Proposal::SplitTerm(_) | Proposal::RawSamples | Proposal::PerLayer => true,
-    }
+    };
+    // At a multiple of the commanded motion a clock shows nothing of its own.
+    let is_hidden = has_clock(info) && common_motion_period_s(score_test.data).is_some();
+    let gain = |values: Vec<f64>| {
+        let column = score_test.effect_column(&EffectTerm::new(info, &values))?;
+        let nats = score_test.gain(&[column]).detectable_nats;
+        Some((values, if is_hidden { 0.0 } else { nats }))
+    };
+    let best = shapes.into_iter().filter_map(gain).max_by(|a, b| a.1.total_cmp(&b.1));
+    Some(best.unwrap_or_else(|| (start(), 0.0)))
 }
 
 fn has_clock(info: &EffectInfo) -> bool {

@@ -33,6 +33,7 @@ pub mod effect_selection;
 mod effect_start;
 pub mod effect_start_values;
 mod error;
+pub mod experiment_check;
 mod fast_tone_cause;
 mod fast_tones;
 mod found_tissue;

@@ -49,7 +49,7 @@ pub(crate) fn search_from_any_start(
     let first = if data_first { from_data(progress) } else { from_assumed(progress) };
     let has_at_most_one = count(&first.0) <= 1;
     if explains(&first.0) && is_out(&first.0.best) == data_first && (has_at_most_one || !data_first) {
-        return Some(search_again(&prepared, first, progress));
+        return Some(first);
     }
     progress("searching from other numbers");
     let (assumed, data) =
@@ -61,28 +61,7 @@ pub(crate) fn search_from_any_start(
         (false, false) => rms_n(&assumed.0) > BETTER_FACTOR * rms_n(&data.0),
         (_, data_explains) => data_explains,
     };
-    Some(search_again(&prepared, if is_data_better { data } else { assumed }, progress))
-}
-
-/// Where several effects were found, the search from the numbers of the fit with them if it explains the force with fewer: effects that
-/// stood for wrong numbers are then not needed any more.
-fn search_again(
-    prepared: &PreparedRecordings,
-    found: (Search, PreparedRecordings),
-    progress: &mut impl FnMut(&str),
-) -> (Search, PreparedRecordings) {
-    let count = |found: &Search| found.best.model.effects.len();
-    if count(&found.0) < 2 {
-        return found;
-    }
-    progress("searching again from the numbers found");
-    let mut assumed = Assumptions::clone(&prepared.assumed);
-    assumed.tissue = found.0.best.model.tissue.clone();
-    let from_result = PreparedRecordings { assumed: Arc::new(assumed), ..prepared.clone() };
-    let Some((base, data)) = fit_base_law(&from_result) else { return found };
-    let again = search(&from_result, base, data, progress);
-    let is_better = again.0.leaves_noise(&again.0.best) && count(&again.0) < count(&found.0);
-    if is_better { again } else { found }
+    Some(if is_data_better { data } else { assumed })
 }
 
 /// The search from a fit of the base law, with the recordings it was fitted to.

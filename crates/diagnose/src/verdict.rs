@@ -181,7 +181,7 @@ pub(crate) fn assess_search(search: &mut Search, competing: &[Vec<CompetingEffec
             ..Cause::default()
         });
     }
-    let base_parameters = base_parameters(search, &covariance);
+    let base_parameters = base_parameters(&covariance);
     let labels = label_parameters(&covariance, &slow_data, &base_parameters, &causes);
     causes.sort_by(|a, b| b.gain_nats.total_cmp(&a.gain_nats));
     let mut depends_on: Vec<String> = structure.depends_on.iter().map(|d| d.0.clone()).collect();
@@ -270,9 +270,9 @@ pub(crate) fn move_negligible(assessment: &mut Assessment, small: Vec<Negligible
 }
 
 /// Estimates of the base law's parameters with their intervals.
-fn base_parameters(search: &Search, covariance: &Covariance) -> Vec<BaseParameter> {
+pub(crate) fn base_parameters(covariance: &Covariance) -> Vec<BaseParameter> {
     let mut out = Vec::new();
-    let assumed_tissue = &search.best.model.assumed.tissue;
+    let assumed_tissue = &covariance.fit.model.assumed.tissue;
     let mut add = |layer: usize, name: &str, role: ParameterRole, assumed: f64, scale: f64| {
         let Some((x, half)) = covariance.shared_parameter(role) else { return };
         let open_above = covariance.prior_upper_end(role);

@@ -126,6 +126,32 @@ pub enum RefitArg {
     Surface,
 }
 
+/// Arguments of `stylet check`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet check assumed.ron --data a.csv b.csv
+  stylet check assumed.ron --data log.csv --columns map.ron --out out/check
+
+Writes report.html and check.json. Each aspect is good, limited or unusable, with the reason. The exit code is 1 when
+a diagnosis would mean nothing.")]
+pub struct CheckArgs {
+    /// Assumed scenario (RON).
+    pub assumed: PathBuf,
+    /// Recordings (CSV with header).
+    #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
+    pub data: Vec<PathBuf>,
+    /// Column map: names and units of the logs' columns (RON).
+    #[arg(long, value_name = "FILE")]
+    pub columns: Option<PathBuf>,
+    /// Drop rows with backward or repeated time stamps.
+    #[arg(long)]
+    pub repair: bool,
+    #[command(flatten)]
+    pub results: OutputArgs,
+    #[command(flatten)]
+    pub limits: ResourceLimits,
+}
+
 /// Arguments of `stylet identifiability`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:

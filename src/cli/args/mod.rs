@@ -14,7 +14,7 @@ pub use benchmark::{
     BenchmarkScoreArgs,
 };
 pub use diagnosis::{
-    DiagnoseArgs, EffectsArgs, IdentifiabilityArgs, IdentifyArgs, PlanArgs, PredictArgs, RefitArg,
+    CheckArgs, DiagnoseArgs, EffectsArgs, IdentifiabilityArgs, IdentifyArgs, PlanArgs, PredictArgs, RefitArg,
 };
 pub use inspect::InspectArgs;
 pub use recordings::{ConvertArgs, EnhanceArgs, ListenArgs};
@@ -58,6 +58,8 @@ pub enum Command {
     Gate(GateArgs),
     /// Compare the online algorithms on the same simulated insertions, over many noise seeds.
     Compare(CompareArgs),
+    /// Check what recordings can show before a diagnosis: data, contact, motion, parameters, effects.
+    Check(CheckArgs),
     /// Compare measured data with a scenario: which effects it lacks, and how much the fit improves.
     Diagnose(DiagnoseArgs),
     /// Find the layers of a phantom in recordings, without a scenario, and diagnose what is left.

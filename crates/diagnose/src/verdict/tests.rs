@@ -195,7 +195,7 @@ fn base_parameters_are_reported_with_the_assumed_values() {
     assumed.tissue.layers[0].friction_ns_per_m2 *= 1.3;
     search.best.model.assumed = Arc::new(assumed);
     let covariance = Covariance::new(&search.best, &search.data, &mut ChaCha8Rng::seed_from_u64(1));
-    let result = base_parameters(&search, &covariance);
+    let result = base_parameters(&covariance);
     let names: Vec<(usize, &str)> = result.iter().map(|p| (p.layer, p.name.as_str())).collect();
     let of_layer = ["stiffness_n_per_m", "friction_ns_per_m2", "puncture_n"].map(|n| (1, n));
     assert_eq!(names, [&of_layer[..], &[(0, "surface_m")]].concat());
@@ -209,7 +209,7 @@ fn base_parameters_are_reported_with_the_assumed_values() {
     let role = ParameterRole::Thickness(0);
     search.best.model.free.thickness = true;
     let unsure = Covariance::new(&search.best, &search.data, &mut ChaCha8Rng::seed_from_u64(1));
-    let result = base_parameters(&search, &unsure);
+    let result = base_parameters(&unsure);
     assert_eq!(
         unsure.shared_parameter(role).is_some(),
         result.iter().any(|p| (p.layer, &p.name[..]) == (1, "thickness_m"))

@@ -1,4 +1,4 @@
-//! The pages of results: diagnosis, prediction, plan, identifiability, comparison, examination, sweep.
+//! The pages of results: check, diagnosis, prediction, plan, identifiability, comparison, examination, sweep.
 //!
 //! One module per page. Each has a function `page` of the results; most have a `summary_sentence` that the terminal prints too. The
 //! pages show what the result files hold and compute nothing else.
@@ -6,6 +6,7 @@
 pub mod algorithm_comparison;
 pub mod diagnosis;
 pub mod examination;
+pub mod experiment_check;
 pub mod experiment_plan;
 pub mod formatting;
 pub mod identifiability;

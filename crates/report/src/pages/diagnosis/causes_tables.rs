@@ -41,7 +41,7 @@ pub(super) fn causes(d: &Diagnosis) -> Section {
                     if c.at_bound.contains(path) { ", at its bound" } else { "" }
                 )),
                 Cell::number(format!("{} to {}", number(e.low), number(e.high))),
-                label_cell(d, 0, Some(&c.effect), path),
+                label_cell(&d.parameters, 0, Some(&c.effect), path),
             ]);
         }
     }
@@ -90,7 +90,7 @@ pub(super) fn base_parameters(d: &Diagnosis) -> Section {
                     format!("{} to {}", number(b.low), number(b.high))
                 }),
                 Cell::number(change(b)).status(status),
-                label_cell(d, b.layer, None, &b.name),
+                label_cell(&d.parameters, b.layer, None, &b.name),
             ]
         })
         .collect();

@@ -34,9 +34,14 @@ fn in_words(p: &LabelledParameter) -> String {
 }
 
 /// A table's cell with the label; empty for a parameter without one.
-pub(super) fn label_cell(d: &Diagnosis, layer: usize, effect: Option<&str>, name: &str) -> Cell {
+pub(crate) fn label_cell(
+    parameters: &[LabelledParameter],
+    layer: usize,
+    effect: Option<&str>,
+    name: &str,
+) -> Cell {
     let is_it = |p: &&LabelledParameter| p.layer == layer && p.effect.as_deref() == effect && p.name == name;
-    let Some(p) = d.parameters.iter().find(is_it) else { return Cell::text("") };
+    let Some(p) = parameters.iter().find(is_it) else { return Cell::text("") };
     let status = if p.label == ParameterLabel::Determined { Status::Plain } else { Status::Warn };
     Cell::text(in_words(p)).status(status)
 }

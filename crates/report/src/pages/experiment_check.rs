@@ -1,0 +1,71 @@
+//! The page of a check: what recordings can show before any effect is searched.
+
+use crate::page_model::{Cell, Page, Section, Status, Table};
+use crate::pages::formatting::{effect_label, strength_parameters};
+use stylet_diagnose::claims::parameter_name;
+use stylet_diagnose::experiment_check::{ExperimentCheck, Light};
+use stylet_scenario::Scenario;
+use stylet_stats::number_format::significant;
+
+/// Whether the recordings suffice, in one sentence.
+#[must_use]
+pub fn summary_sentence(check: &ExperimentCheck) -> &'static str {
+    if !check.is_usable() {
+        "A diagnosis of these recordings would mean nothing."
+    } else if check.items.iter().all(|item| item.light == Light::Good) {
+        "Nothing stands against a diagnosis."
+    } else {
+        "A diagnosis is possible, within the limits below."
+    }
+}
+
+/// The page of a check of recordings against `scenario`.
+#[must_use]
+pub fn page(scenario: &Scenario, recordings: &[String], check: &ExperimentCheck) -> Page {
+    let items = check.items.iter().map(|item| {
+        let (word, status) = match item.light {
+            Light::Good => ("good", Status::Good),
+            Light::Limited => ("limited", Status::Warn),
+            Light::Unusable => ("unusable", Status::Bad),
+        };
+        vec![
+            Cell::text(item.topic.clone()),
+            Cell::text(word).status(status),
+            Cell::text(item.message.clone()),
+        ]
+    });
+    let number = |x: f64| significant(x, 4);
+    let parameters = check.base_parameters.iter().map(|b| {
+        vec![
+            Cell::text(parameter_name(b)),
+            Cell::number(number(b.assumed)),
+            Cell::number(format!("{} to {}", number(b.low), number(b.high))),
+            crate::pages::diagnosis::label_cell(&check.parameters, b.layer, None, &b.name),
+        ]
+    });
+    let effects = check.effects.iter().map(|e| {
+        let from = e.smallest.as_ref();
+        let from = from.map_or_else(|| "no plausible size".to_owned(), |s| strength_parameters(&e.effect, s));
+        let status = if e.visible { Status::Plain } else { Status::Warn };
+        vec![Cell::text(effect_label(&e.effect)), Cell::text(from).status(status)]
+    });
+    Page::new(format!("Check: {}", scenario.name))
+        .subtitle(summary_sentence(check))
+        .fact("recordings", recordings.join(", "))
+        .fact("stylet", env!("CARGO_PKG_VERSION"))
+        .section(Section::new("Before the fit").table(Table::new(
+            "What these recordings allow",
+            &["aspect", "", "reason"],
+            items.collect(),
+        )))
+        .section(Section::new("Parameters of the layers").table(Table::new(
+            "As the recordings determine them when no effect is missing",
+            &["parameter", "assumed", "95 % interval", "by these recordings"],
+            parameters.collect(),
+        )))
+        .section(Section::new("Effects").table(Table::new(
+            "Smallest size of each effect that would be seen",
+            &["effect", "from"],
+            effects.collect(),
+        )))
+}

@@ -1,0 +1,50 @@
+//! `stylet check`: what recordings can show, before a diagnosis.
+
+use crate::cli::args::CheckArgs;
+use crate::cli::exit_codes::Failure;
+use std::fmt::Write as _;
+use stylet_api::output_folder::check_folder;
+use stylet_api::{DiagnosisInputs, Scenario, resource_estimate};
+use stylet_diagnose::experiment_check::{ExperimentCheck, Light};
+use stylet_report::pages::experiment_check::summary_sentence;
+
+/// `stylet check`.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits; [`Failure::Unusable`] where a diagnosis would mean nothing.
+pub fn check(args: &CheckArgs) -> Result<(), Failure> {
+    args.limits.check(
+        &args.assumed,
+        &resource_estimate::estimate_diagnose(&args.data),
+        args.results.quiet,
+    )?;
+    let folder = args.results.output_folder(&args.assumed, "-check");
+    let read = args.results.inputs(&args.assumed, args.data.iter().chain(&args.columns));
+    check_folder(&folder, "check.json", &read)?;
+    let inputs = DiagnosisInputs {
+        scenario: args.assumed.clone(),
+        data: args.data.clone(),
+        columns: args.columns.clone(),
+        repair: args.repair,
+    };
+    let scenario = Scenario::load(&inputs.scenario)?;
+    let report = stylet_api::check(&scenario, &inputs.read_recordings()?)?;
+    let output = report.output.with_inputs(read);
+    args.results.write_and_print(&folder, &output, || text(&report.check))?;
+    let unusable = report.check.items.iter().find(|item| item.light == Light::Unusable);
+    unusable.map_or(Ok(()), |item| Err(Failure::Unusable(item.message.clone())))
+}
+
+/// One line per aspect.
+fn text(check: &ExperimentCheck) -> String {
+    let mut out = format!("{}\n\n", summary_sentence(check));
+    for item in &check.items {
+        let word = match item.light {
+            Light::Good => "good",
+            Light::Limited => "limited",
+            Light::Unusable => "unusable",
+        };
+        let _ = writeln!(out, "  {word:<9} {:<11} {}", item.topic, item.message);
+    }
+    out
+}
