@@ -51,6 +51,9 @@ pub fn summary(d: &Diagnosis) -> String {
         },
         significant(g.floor_n, 3)
     );
+    if let Some(grade) = &d.grade {
+        let _ = writeln!(out, "  {}", grade.sentence());
+    }
     for sentence in findings(d) {
         let _ = writeln!(out, "  {sentence}");
     }

@@ -39,18 +39,22 @@ pub(crate) fn search_with_baseline(
     progress: &mut impl FnMut(&str),
 ) -> (Search, PreparedRecordings) {
     progress("fitting the sensor's baseline");
-    let baseline = Baseline::fit(prepared, &base, &data);
-    let Some(baseline) = baseline else {
-        return (Search::run(prepared, base, data, progress), prepared.clone());
+    let explains = |b: &Baseline| leaves_noise(&b.fit, &b.data);
+    let first = Baseline::fit(prepared, &base, &data, false).filter(explains);
+    let is_dominant = |b: &Baseline| base.rms_n(&data) > DOMINANT_FACTOR * b.fit.rms_n(&b.data);
+    let from_base = match &first {
+        Some(baseline) if is_dominant(baseline) => None,
+        _ => Some(Search::run(prepared, base.clone(), data.clone(), progress)),
     };
-    let Baseline { prepared: with_steps, fit, data: data_of_baseline, stages } = baseline;
-    let explains = leaves_noise(&fit, &data_of_baseline);
-    let dominant = explains && base.rms_n(&data) > DOMINANT_FACTOR * fit.rms_n(&data_of_baseline);
-    let from_base = (!dominant).then(|| Search::run(prepared, base.clone(), data, progress));
-    let from_base = match from_base {
+    let baseline = match (&from_base, first) {
+        (_, Some(baseline)) => Some(baseline),
         // Other effects leave only noise, and the baseline alone does not: no second search.
-        Some(s) if !explains && leaves_noise(&s.best, &s.data) => return (s, prepared.clone()),
-        other => other,
+        (Some(s), None) if leaves_noise(&s.best, &s.data) => None,
+        (_, None) => Baseline::fit(prepared, &base, &data, true),
+    };
+    let Some(Baseline { prepared: with_steps, fit, data: data_of_baseline, stages }) = baseline else {
+        let s = from_base.unwrap_or_else(|| Search::run(prepared, base, data, progress));
+        return (s, prepared.clone());
     };
     let start = Search { base, stages, ..Search::from_fit(fit, data_of_baseline) };
     let mut from_baseline = Search::run_from(start, &with_steps, progress);
@@ -81,8 +85,9 @@ struct Baseline {
 }
 
 impl Baseline {
-    /// The baseline of the recordings; `None` when nothing of it pays.
-    fn fit(prepared: &PreparedRecordings, base: &Fit, data: &FitData) -> Option<Self> {
+    /// The baseline of the recordings; `None` when nothing of it pays. With `exchange` a drop may also be a step instead of a rupture,
+    /// or the reverse, which takes many fits.
+    fn fit(prepared: &PreparedRecordings, base: &Fit, data: &FitData, exchange: bool) -> Option<Self> {
         let infos: Vec<&'static EffectInfo> = general_effects().filter(|i| i.baseline).collect();
         let candidates = zero_step_candidates(prepared);
         let jumps_up = candidates.steps.iter().flatten().any(|s| s.size_n > 0.0);
@@ -107,7 +112,7 @@ impl Baseline {
         };
         // As long as more than noise is left, a drop may be a step instead of a rupture, or the reverse.
         let exchanged = |mut best: Fitted| {
-            for _ in 0..MAX_EXCHANGES {
+            for _ in 0..if exchange { MAX_EXCHANGES } else { 0 } {
                 if leaves_noise(&best.1, &best.2) {
                     break;
                 }
@@ -126,7 +131,7 @@ impl Baseline {
             best
         };
         let mut best = exchanged(fitted(candidates.steps.clone())?);
-        if !leaves_noise(&best.1, &best.2) {
+        if exchange && !leaves_noise(&best.1, &best.2) {
             // Many steps: all drops that no layer takes.
             let known = |drop: &&(usize, ZeroStep)| best.0.zero_steps[drop.0].contains(&drop.1);
             let more = unassigned(&candidates.drops, &best.1).filter(|drop| !known(drop));

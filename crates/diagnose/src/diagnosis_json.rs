@@ -1,5 +1,6 @@
 //! Result of a diagnosis, serialised as `diagnosis.json` (docs/reference/files.md, section "diagnosis.json").
 
+use crate::model_grade::Grade;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use stylet_record::QualityNote;
@@ -297,6 +298,9 @@ pub struct Diagnosis {
     /// Whether the simulation agrees with the data: no effect is missing, and no finding contradicts.
     #[serde(default)]
     pub agrees: bool,
+    /// Grade of the extended model; `None` for data sets of repeats and specimens.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grade: Option<Grade>,
     /// Findings that contradict agreement, or that limit the confidence.
     #[serde(default)]
     pub findings: Vec<Finding>,

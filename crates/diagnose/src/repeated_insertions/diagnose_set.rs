@@ -207,6 +207,7 @@ fn diagnosis(
     let mut diagnosis = Diagnosis {
         verdict,
         agrees: false,
+        grade: None,
         findings: Vec::new(),
         partial: None,
         causes,

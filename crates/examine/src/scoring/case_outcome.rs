@@ -49,6 +49,9 @@ pub struct CaseOutcome {
     pub expected: Expected,
     /// What was said.
     pub verdict: Verdict,
+    /// Grade of the model, A to D, if the answer has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grade: Option<String>,
     /// Causes named, each with its class.
     pub named: Vec<Vec<String>>,
     /// Confidences of the causes, and whether each is one that is there.
@@ -97,6 +100,7 @@ impl CaseOutcome {
             values,
             strength_sd: case.setup.strength_sd,
             verdict: answer.verdict,
+            grade: answer.grade.as_ref().map(|g| g.letter.clone()),
             named: answer
                 .causes
                 .iter()

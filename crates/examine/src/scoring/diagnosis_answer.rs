@@ -94,11 +94,21 @@ pub enum Verdict {
     Parameters,
 }
 
+/// The grade that an answer gives its model.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Grade {
+    /// A to D.
+    pub letter: String,
+}
+
 /// An answer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Answer {
     /// Verdict.
     pub verdict: Verdict,
+    /// Grade of its model.
+    #[serde(default)]
+    pub grade: Option<Grade>,
     /// Causes, strongest first.
     #[serde(default)]
     pub causes: Vec<Cause>,
@@ -136,6 +146,7 @@ impl Answer {
     pub fn none() -> Self {
         Self {
             verdict: Verdict::None,
+            grade: None,
             causes: Vec::new(),
             base_parameters: Vec::new(),
             parameters: Vec::new(),

@@ -110,6 +110,7 @@ pub fn results_text(outcomes: &[CaseOutcome]) -> String {
     said(&mut out, outcomes);
     held(&mut out, outcomes);
     labelled(&mut out, outcomes);
+    graded(&mut out, outcomes);
     confident(&mut out, outcomes);
     let failed: Vec<&CaseOutcome> = outcomes.iter().filter(|o| o.failed.is_some()).collect();
     if let Some(first) = failed.first() {
@@ -206,6 +207,22 @@ fn labelled(out: &mut String, outcomes: &[CaseOutcome]) {
     for (label, all) in &by {
         let [held, told] = [SuccessRate::of(all, |(held, _)| *held), SuccessRate::of(all, |(_, told)| *told)];
         let _ = writeln!(out, "    {label:<24}{held:<28}{told}");
+    }
+}
+
+/// How often the answer is right, by the grade of its model.
+fn graded(out: &mut String, outcomes: &[CaseOutcome]) {
+    let mut by: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
+    for o in outcomes {
+        if let Some(grade) = &o.grade {
+            by.entry(grade).or_default().push(o.worth.correct);
+        }
+    }
+    if !by.is_empty() {
+        let _ = writeln!(out, "\nby the grade of the model: right");
+    }
+    for (grade, right) in &by {
+        let _ = writeln!(out, "    {grade}  {}", SuccessRate::of(right, |right| **right));
     }
 }
 

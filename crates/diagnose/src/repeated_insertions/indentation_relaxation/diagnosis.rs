@@ -51,6 +51,7 @@ impl SpecimenReport {
         let noise = stylet_stats::median_of(recordings.iter().map(SegmentedRecording::noise_n));
         let mut diagnosis = Diagnosis {
             agrees: false,
+            grade: None,
             findings: Vec::new(),
             partial: None,
             negligible: Vec::new(),

@@ -25,6 +25,7 @@ use std::fmt::Write as _;
 use stylet_diagnose::DiagnosisResult;
 use stylet_diagnose::claims::SIGNIFICANT_P_VALUE;
 use stylet_diagnose::diagnosis_json::{Diagnosis, Verdict};
+use stylet_diagnose::model_grade::Letter;
 use stylet_diagnose::report_curves::recording_curves;
 use stylet_scenario::Scenario;
 use stylet_stats::number_format::{p_value, significant};
@@ -82,6 +83,16 @@ fn verdict(d: &Diagnosis) -> Section {
         Verdict::Parameters => "parameters",
     };
     let mut tiles = vec![Tile::new("Verdict", word, summary_sentence(d))];
+    if let Some(grade) = &d.grade {
+        let status = match grade.letter {
+            Letter::A => Status::Good,
+            Letter::B | Letter::C => Status::Warn,
+            Letter::D => Status::Bad,
+        };
+        let reasons: Vec<String> =
+            grade.parts.iter().map(|p| format!("{:?}: {}", p.letter, p.reason)).collect();
+        tiles.push(Tile::new("Grade", format!("{:?}", grade.letter), reasons.join("; ")).status(status));
+    }
     for c in &d.causes {
         let parameters = c
             .parameters
