@@ -39,8 +39,7 @@ pub(crate) fn search_with_baseline(
     progress: &mut impl FnMut(&str),
 ) -> (Search, PreparedRecordings) {
     progress("fitting the sensor's baseline");
-    let explains = |b: &Baseline| leaves_noise(&b.fit, &b.data);
-    let first = Baseline::fit(prepared, &base, &data, false).filter(explains);
+    let first = Baseline::fit(prepared, &base, &data, false).filter(|b| leaves_noise(&b.fit, &b.data));
     let is_dominant = |b: &Baseline| base.rms_n(&data) > DOMINANT_FACTOR * b.fit.rms_n(&b.data);
     let from_base = match &first {
         Some(baseline) if is_dominant(baseline) => None,
@@ -86,7 +85,7 @@ struct Baseline {
 
 impl Baseline {
     /// The baseline of the recordings; `None` when nothing of it pays. With `exchange` a drop may also be a step instead of a rupture,
-    /// or the reverse, which takes many fits.
+    /// or the reverse, which takes many fits; without, it has to leave only noise.
     fn fit(prepared: &PreparedRecordings, base: &Fit, data: &FitData, exchange: bool) -> Option<Self> {
         let infos: Vec<&'static EffectInfo> = general_effects().filter(|i| i.baseline).collect();
         let candidates = zero_step_candidates(prepared);
@@ -152,6 +151,9 @@ impl Baseline {
             best = other;
         }
         let (prepared, fit, data) = best;
+        if !exchange && !leaves_noise(&fit, &data) {
+            return None;
+        }
         let (fit, data) = select_random_effects(fit, data);
         let mut search = Search { base: base.clone(), ..Search::from_fit(fit, data) };
         let stages = search.prune_baseline();

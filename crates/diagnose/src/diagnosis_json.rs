@@ -102,13 +102,13 @@ pub struct BaseParameter {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ParameterLabel {
-    /// The data bound it on both sides.
+    /// The data bound it on both sides, or to 10 %.
     Determined,
     /// The data bound it on one side.
     OneSided,
     /// The data do not bound it: the estimate is that of the prior.
     NotIdentifiable,
-    /// Known to no better than 10 %, and only together with another parameter.
+    /// Known only together with another parameter.
     TradesWith,
     /// It stands at a bound of the search.
     AtBound,

@@ -13,7 +13,7 @@ use stylet_stats::Z95;
 
 /// The data close an interval where they lose at least this share of an interval end's loss: the prior provides the rest.
 const MIN_DATA_SHARE: f64 = 0.5;
-/// Half width of a 95 % interval, relative to the value, up to which a parameter is determined whatever it correlates with.
+/// Half width of a 95 % interval, relative to the value, up to which a parameter is determined.
 const MAX_RELATIVE_HALF_WIDTH: f64 = 0.1;
 /// Correlation from which two estimates trade.
 const MIN_CORRELATION: f64 = 0.9;
@@ -61,8 +61,8 @@ pub(crate) fn label_parameters(
         let mut out = e.labelled;
         out.trades_with = partner.map(|j| names[j].clone());
         out.correlation = partner.map_or(0.0, |j| correlations[i][j]);
-        if out.label == ParameterLabel::Determined {
-            out.label = if partner.is_some() && is_wide {
+        if out.label == ParameterLabel::Determined && is_wide {
+            out.label = if partner.is_some() {
                 ParameterLabel::TradesWith
             } else {
                 profile_label(covariance, data, e.role)
