@@ -18,7 +18,7 @@ use crate::input_checks::{
     CleanRecordings, NamedRecording, check_recordings, clean_recordings, force_outlier_notes,
 };
 use crate::measured_start::search_from_any_start;
-use crate::model_grade::Grade;
+use crate::model_grade::grade;
 use crate::motion_period::common_motion_period_s;
 use crate::negligible_effects::{Negligible, negligible_effects};
 use crate::partial_model::partial_model;
@@ -231,7 +231,7 @@ pub(crate) fn diagnose_given_layers(
     };
     claims::compare_with_scenario(&mut diagnosis.base_parameters, scenario);
     claims::apply(&mut diagnosis, &context);
-    diagnosis.grade = (!options.brief).then(|| Grade::new(&diagnosis, context.resolution_n));
+    diagnosis.grade = (!options.brief).then(|| grade(&diagnosis, context.resolution_n));
     let extended_scenario = extended_scenario(scenario, &search, &diagnosis);
     Ok(DiagnosisResult {
         diagnosis,

@@ -1,6 +1,5 @@
 //! Result of a diagnosis, serialised as `diagnosis.json` (docs/reference/files.md, section "diagnosis.json").
 
-use crate::model_grade::Grade;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use stylet_record::QualityNote;
@@ -148,6 +147,55 @@ impl std::fmt::Display for LabelledParameter {
             (None, 0) => write!(f, "{}", self.name),
             (None, layer) => write!(f, "{} of layer {layer}", self.name),
         }
+    }
+}
+
+/// A letter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Letter {
+    /// Predicts to the noise, from what the recordings determine.
+    A,
+    /// Good, with a limit that another recording would lift.
+    B,
+    /// Use with care.
+    C,
+    /// Do not rely on it.
+    #[default]
+    D,
+}
+
+/// One part of a grade.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GradePart {
+    /// `error`, `residual`, `parameters`, `causes` or `recordings`.
+    pub part: String,
+    /// Its letter.
+    pub letter: Letter,
+    /// The reason.
+    pub reason: String,
+}
+
+/// Grade of an extended model.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Grade {
+    /// The worst of the parts.
+    pub letter: Letter,
+    /// The parts.
+    pub parts: Vec<GradePart>,
+}
+
+impl Grade {
+    /// The letter with the reasons that keep it from being better.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        let worst: Vec<&str> = self
+            .parts
+            .iter()
+            .filter(|p| p.letter == self.letter && p.letter > Letter::A)
+            .map(|p| p.reason.as_str())
+            .collect();
+        let reasons = if worst.is_empty() { String::new() } else { format!(": {}", worst.join("; ")) };
+        format!("grade {:?}{reasons}", self.letter)
     }
 }
 

@@ -48,7 +48,7 @@ mod local_minima;
 mod mains_frequency;
 mod measured_start;
 pub mod model_comparison;
-pub mod model_grade;
+mod model_grade;
 mod model_pruning;
 mod motion_period;
 pub mod negligible_effects;

@@ -9,8 +9,7 @@
 //! | recordings | different motions, each predicted from the others | one motion | one recording | |
 
 use crate::claims::SIGNIFICANT_P_VALUE;
-use crate::diagnosis_json::{Diagnosis, FindingKind, ParameterLabel, Verdict};
-use serde::{Deserialize, Serialize};
+use crate::diagnosis_json::{Diagnosis, FindingKind, Grade, GradePart, Letter, ParameterLabel, Verdict};
 use stylet_stats::number_format::significant;
 
 /// Errors over the noise up to which a model has grade A, B and C.
@@ -18,110 +17,57 @@ const MAX_ERROR: [f64; 3] = [1.25, 2.0, 4.0];
 /// Shares of determined parameters from which a model has grade A, B and C.
 const MIN_DETERMINED: [f64; 3] = [2.0 / 3.0, 0.5, 0.25];
 
-/// A letter.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Letter {
-    /// Predicts to the noise, from what the recordings determine.
-    A,
-    /// Good, with a limit that another recording would lift.
-    B,
-    /// Use with care.
-    C,
-    /// Do not rely on it.
-    #[default]
-    D,
-}
-
-/// One part of a grade.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct GradePart {
-    /// `error`, `residual`, `parameters`, `causes` or `recordings`.
-    pub part: String,
-    /// Its letter.
-    pub letter: Letter,
-    /// The reason.
-    pub reason: String,
-}
-
-/// Grade of an extended model.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Grade {
-    /// The worst of the parts.
-    pub letter: Letter,
-    /// The parts.
-    pub parts: Vec<GradePart>,
-}
-
-impl Grade {
-    /// The grade of a finished diagnosis; an error up to `resolution_n` is no misfit.
-    #[must_use]
-    pub fn new(d: &Diagnosis, resolution_n: f64) -> Self {
-        let mut parts = Vec::new();
-        let mut add = |part: &str, letter: Letter, reason: String| {
-            parts.push(GradePart { part: part.to_owned(), letter, reason });
-        };
-        let g = &d.gain;
-        let ratio = g.rmse_given_scatter_n / g.floor_n.max(resolution_n).max(f64::MIN_POSITIVE);
-        let what = if g.held_out { "held-out recordings are predicted" } else { "the recording is fitted" };
-        add(
-            "error",
-            of_rank(rank(ratio, MAX_ERROR)),
-            format!("{what} to {} times the noise", significant(ratio, 2)),
-        );
-        let depends = d.residual_structure.depends_on.join(", ");
-        match (d.verdict, d.residual_structure.p_value < SIGNIFICANT_P_VALUE) {
-            (Verdict::Unknown, _) => {
-                add(
-                    "residual",
-                    Letter::D,
-                    "an effect is missing that the library does not contain".to_owned(),
-                );
-            }
-            (_, true) => add("residual", Letter::C, format!("the residual depends on {depends}")),
-            (_, false) => add("residual", Letter::A, "the residual is noise".to_owned()),
+/// The grade of a finished diagnosis; an error up to `resolution_n` is no misfit.
+#[must_use]
+pub fn grade(d: &Diagnosis, resolution_n: f64) -> Grade {
+    let mut parts = Vec::new();
+    let mut add = |part: &str, letter: Letter, reason: String| {
+        parts.push(GradePart { part: part.to_owned(), letter, reason });
+    };
+    let g = &d.gain;
+    let ratio = g.rmse_given_scatter_n / g.floor_n.max(resolution_n).max(f64::MIN_POSITIVE);
+    let what = if g.held_out { "held-out recordings are predicted" } else { "the recording is fitted" };
+    add(
+        "error",
+        of_rank(rank(ratio, MAX_ERROR)),
+        format!("{what} to {} times the noise", significant(ratio, 2)),
+    );
+    let depends = d.residual_structure.depends_on.join(", ");
+    match (d.verdict, d.residual_structure.p_value < SIGNIFICANT_P_VALUE) {
+        (Verdict::Unknown, _) => {
+            add("residual", Letter::D, "an effect is missing that the library does not contain".to_owned());
         }
-        let total = d.parameters.len();
-        let determined = d.parameters.iter().filter(|p| p.label == ParameterLabel::Determined).count();
-        if total > 0 {
-            let letter = of_rank(rank(-(determined as f64) / total as f64, MIN_DETERMINED.map(|x| -x)));
-            add("parameters", letter, format!("{determined} of {total} parameters are determined"));
-        }
-        let at_bound = d.findings.iter().find(|f| f.kind == FindingKind::AtBound);
-        match at_bound {
-            Some(finding) => add("causes", Letter::C, finding.message.clone()),
-            None if d.verdict == Verdict::Ambiguous => {
-                add("causes", Letter::B, "other causes explain the recordings as well".to_owned());
-            }
-            None => {}
-        }
-        let has = |kind: FindingKind| d.findings.iter().any(|f| f.kind == kind);
-        let (letter, reason) = if !g.held_out {
-            (Letter::C, "one recording: the model predicted no other".to_owned())
-        } else if has(FindingKind::OneMotion) {
-            (Letter::B, "all recordings have the same motion".to_owned())
-        } else {
-            (Letter::A, format!("{} recordings, each predicted from the others", g.recordings.len()))
-        };
-        add("recordings", letter, reason);
-        if has(FindingKind::Scatter) {
-            add("recordings", Letter::C, "recordings differ too much for one model".to_owned());
-        }
-        let letter = parts.iter().map(|p| p.letter).max().unwrap_or_default();
-        Self { letter, parts }
+        (_, true) => add("residual", Letter::C, format!("the residual depends on {depends}")),
+        (_, false) => add("residual", Letter::A, "the residual is noise".to_owned()),
     }
-
-    /// The letter with the reasons that keep it from being better.
-    #[must_use]
-    pub fn sentence(&self) -> String {
-        let worst: Vec<&str> = self
-            .parts
-            .iter()
-            .filter(|p| p.letter == self.letter && p.letter > Letter::A)
-            .map(|p| p.reason.as_str())
-            .collect();
-        let reasons = if worst.is_empty() { String::new() } else { format!(": {}", worst.join("; ")) };
-        format!("grade {:?}{reasons}", self.letter)
+    let total = d.parameters.len();
+    let determined = d.parameters.iter().filter(|p| p.label == ParameterLabel::Determined).count();
+    if total > 0 {
+        let letter = of_rank(rank(-(determined as f64) / total as f64, MIN_DETERMINED.map(|x| -x)));
+        add("parameters", letter, format!("{determined} of {total} parameters are determined"));
     }
+    let at_bound = d.findings.iter().find(|f| f.kind == FindingKind::AtBound);
+    match at_bound {
+        Some(finding) => add("causes", Letter::C, finding.message.clone()),
+        None if d.verdict == Verdict::Ambiguous => {
+            add("causes", Letter::B, "other causes explain the recordings as well".to_owned());
+        }
+        None => {}
+    }
+    let has = |kind: FindingKind| d.findings.iter().any(|f| f.kind == kind);
+    let (letter, reason) = if !g.held_out {
+        (Letter::C, "one recording: the model predicted no other".to_owned())
+    } else if has(FindingKind::OneMotion) {
+        (Letter::B, "all recordings have the same motion".to_owned())
+    } else {
+        (Letter::A, format!("{} recordings, each predicted from the others", g.recordings.len()))
+    };
+    add("recordings", letter, reason);
+    if has(FindingKind::Scatter) {
+        add("recordings", Letter::C, "recordings differ too much for one model".to_owned());
+    }
+    let letter = parts.iter().map(|p| p.letter).max().unwrap_or_default();
+    Grade { letter, parts }
 }
 
 /// Number of limits that a value exceeds.

@@ -24,8 +24,7 @@ use residual_charts::{
 use std::fmt::Write as _;
 use stylet_diagnose::DiagnosisResult;
 use stylet_diagnose::claims::SIGNIFICANT_P_VALUE;
-use stylet_diagnose::diagnosis_json::{Diagnosis, Verdict};
-use stylet_diagnose::model_grade::Letter;
+use stylet_diagnose::diagnosis_json::{Diagnosis, Letter, Verdict};
 use stylet_diagnose::report_curves::recording_curves;
 use stylet_scenario::Scenario;
 use stylet_stats::number_format::{p_value, significant};
