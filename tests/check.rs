@@ -53,6 +53,9 @@ fn one_constant_speed_leaves_stiffness_and_friction_trading_and_check_and_diagno
             label(&file, 2, "stiffness_n_per_m"),
             ("trades_with".to_owned(), "friction_ns_per_m2 of layer 2".to_owned())
         );
+        if command == "diagnose" {
+            assert!(said.contains("grade C: one recording"), "{said}");
+        }
         assert_eq!(label(&file, 1, "stiffness_n_per_m").0, "determined");
         assert_eq!(label(&file, 2, "thickness_m").0, "not_identifiable");
     }
@@ -108,4 +111,35 @@ fn recordings_that_are_no_insertion_end_with_exit_code_1_and_a_report() {
         assert!(said.contains("unusable") && said.contains(reason), "{said}");
         assert!(fs::exists(format!("{out}/report.html")).expect("a folder"));
     }
+}
+
+#[test]
+fn two_sessions_of_one_tissue_are_one_model_and_a_softer_layer_is_found() {
+    let scratch = Scratch::new("check-sessions");
+    let assumed = text(&scratch.file("assumed.ron", scenario(VARIED)));
+    let softer = scenario(VARIED).replace("stiffness_n_per_m: 90.0", "stiffness_n_per_m: 88.0");
+    let softer = text(&scratch.file("softer.ron", softer));
+    let session = |name: &str, real: &str, seeds: [&str; 2]| {
+        let data = seeds.map(|seed| {
+            let out = text(&scratch.path().join(format!("{name}-{seed}")));
+            let output = stylet(&["run", real, "--quiet", "--seed", seed, "--out", &out]);
+            assert!(output.status.success(), "{}", stderr_text(&output));
+            format!("{out}/recording.csv")
+        });
+        let out = text(&scratch.path().join(name));
+        let output = stylet(&["diagnose", &assumed, "--data", &data[0], &data[1], "--quiet", "--out", &out]);
+        assert!(output.status.success(), "{}", stderr_text(&output));
+        out
+    };
+    let monday = session("monday", &assumed, ["1", "2"]);
+    let compared = |other: &str| {
+        let out = text(&scratch.path().join("compared"));
+        let output = stylet(&["compare-models", &monday, other, "--out", &out]);
+        assert!(output.status.success(), "{}", stderr_text(&output));
+        String::from_utf8_lossy(&output.stdout).into_owned()
+    };
+    let said = compared(&session("tuesday", &assumed, ["3", "4"]));
+    assert!(said.starts_with("Both are one model"), "{said}");
+    let said = compared(&session("wednesday", &softer, ["5", "6"]));
+    assert!(said.starts_with("The models differ: they differ in stiffness_n_per_m of layer 2."), "{said}");
 }

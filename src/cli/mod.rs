@@ -4,6 +4,7 @@ mod args;
 mod benchmark;
 mod check;
 mod compare;
+mod compare_models;
 mod convert;
 mod diagnose;
 mod diagnose_repeats;
@@ -85,6 +86,7 @@ pub fn main() -> ExitCode {
         Command::Gate(args) => sweep::gate(args),
         Command::Compare(args) => compare::compare(args),
         Command::Check(args) => check::check(args),
+        Command::CompareModels(args) => compare_models::run(args),
         Command::Diagnose(args) => diagnose::diagnose(args),
         Command::Identify(args) => identify::identify(args),
         Command::Predict(args) => predict::predict(args),

@@ -20,6 +20,7 @@
 pub mod benchmark;
 mod check_experiment;
 pub mod compare_algorithms;
+pub mod compare_models;
 mod diagnose;
 pub mod diagnose_repeats;
 pub mod diagnose_specimens;

@@ -26,10 +26,11 @@ const COMPLETE: &str = ".stylet-set";
 const OLD: &str = ".stylet-old";
 
 /// The file by which the results of a command are recognised, and the command.
-const RESULT_FILES: [(&str, &str); 10] = [
+const RESULT_FILES: [(&str, &str); 11] = [
     ("score.json", "run"),
     ("enhance.json", "enhance"),
     ("check.json", "check"),
+    ("consistency.json", "compare-models"),
     ("diagnosis.json", "diagnose"),
     ("predict.json", "predict"),
     ("identifiability.json", "identifiability"),

@@ -37,7 +37,7 @@ impl ModelOrigin {
 }
 
 /// The diagnosis that a model came from, if it lies next to it.
-fn diagnosis(path: &Path) -> Result<Option<Diagnosis>, Error> {
+pub(crate) fn diagnosis(path: &Path) -> Result<Option<Diagnosis>, Error> {
     let Ok(text) = std::fs::read_to_string(path) else { return Ok(None) };
     serde_json::from_str(&text).map(Some).map_err(|e| {
         let cause = stylet_scenario::renamed_json_key(&text).unwrap_or_else(|| e.to_string());

@@ -48,6 +48,7 @@ mod local_minima;
 mod mains_frequency;
 mod measured_start;
 pub mod model_comparison;
+pub mod model_consistency;
 mod model_grade;
 mod model_pruning;
 mod motion_period;

@@ -66,6 +66,58 @@ pub fn diagnose(
     Ok(Diagnosis { found: found.map_err(failure)?, assumed })
 }
 
+/// Finds the layers that recordings show, and diagnoses what is left.
+#[pyfunction]
+#[pyo3(signature = (measured, layers=None, columns=None, repair=false, progress=None))]
+pub fn identify(
+    py: Python<'_>,
+    measured: Vec<Measured<'_>>,
+    layers: Option<usize>,
+    columns: Option<PathBuf>,
+    repair: bool,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Diagnosis> {
+    let recordings = to_recordings(&measured, columns, repair)?;
+    let name =
+        recordings.first().map_or("phantom", |r| r.name.rsplit_once('.').map_or(&*r.name, |(stem, _)| stem));
+    let assumed = name.to_owned();
+    let named = assumed.clone();
+    let found = run_in_background(py, progress, move |callback| {
+        let mut done = 0;
+        let found = stylet::identify(&named, &recordings, layers, |what| {
+            done += 1;
+            callback.report_or_stop(what, done);
+        });
+        found.and_then(|(scenario, found)| {
+            let (json, ron) = (found.json()?, found.extended_ron(&named)?);
+            let html = found.html(&scenario, &named, "stylet.identify".to_owned());
+            Ok(Parts { json, ron, html, extended: found.extended })
+        })
+    })?;
+    Ok(Diagnosis { found: found.map_err(failure)?, assumed })
+}
+
+/// What recordings can show, before a diagnosis: `check.json` and the report.
+#[pyfunction]
+#[pyo3(signature = (kind, source, measured, columns=None, repair=false))]
+pub fn check(
+    kind: &str,
+    source: &str,
+    measured: Vec<Measured<'_>>,
+    columns: Option<PathBuf>,
+    repair: bool,
+) -> PyResult<(String, String)> {
+    let scenario = parse(kind, source)?;
+    let recordings = to_recordings(&measured, columns, repair)?;
+    let found = stylet::check(&scenario, &recordings).map_err(failure)?;
+    let file = |name: &str| {
+        let content =
+            found.output.files().find(|(file, _)| *file == name).map_or(&[][..], |(_, bytes)| bytes);
+        String::from_utf8_lossy(content).into_owned()
+    };
+    Ok((file("check.json"), file("report.html")))
+}
+
 /// Reads recordings from files or columns.
 pub fn to_recordings(
     measured: &[Measured<'_>],

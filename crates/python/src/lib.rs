@@ -31,7 +31,7 @@ mod _stylet {
     #[pymodule_export]
     use super::StyletError;
     #[pymodule_export]
-    use super::diagnosis::{Diagnosis, diagnose};
+    use super::diagnosis::{Diagnosis, check, diagnose, identify};
     #[pymodule_export]
     use super::enhancer::{Enhanced, Enhancer, Output, check_config, enhance};
     #[pymodule_export]

@@ -35,3 +35,18 @@ def test_diagnose_gives_the_files_of_diagnose(command, tmp_path, two_gels):
     measured = stylet.read_csv(files[0])["force_n"]
     assert (((force - measured) ** 2).mean()) ** 0.5 < 2 * found.gain["floor_n"] + 0.02
     assert len(found.plot().lines) >= 2
+
+
+def test_check_and_identify_give_the_files_of_the_commands(command, tmp_path, two_gels):
+    (tmp_path / "assumed.ron").write_text(two_gels)
+    for seed in (1, 2):
+        (tmp_path / f"{seed}.csv").write_bytes(stylet.simulate(two_gels, seed=seed).recording_csv())
+    files = [tmp_path / "1.csv", tmp_path / "2.csv"]
+    command("check", "assumed.ron", "--data", *files, "--out", "check", "--quiet", cwd=tmp_path)
+    checked = stylet.check(tmp_path / "assumed.ron", files)
+    assert checked.json() == (tmp_path / "check" / "check.json").read_bytes()
+    assert checked.usable and set(checked.items["light"]) <= {"good", "limited"}
+    command("identify", "--data", *files, "--out", "phantom", "--quiet", cwd=tmp_path)
+    found = stylet.identify(files, progress=False)
+    assert found.json() == (tmp_path / "phantom" / "diagnosis.json").read_bytes()
+    assert len(found.covariance) == len(found.parameters) and found.grade in "ABCD"

@@ -7,7 +7,7 @@ use crate::sliders::{named, rounded};
 use crate::workspace::{LIMITS, Workspace};
 use serde_json::{Value, json};
 use stylet_api::{Diagnosis, Limits, Scenario};
-use stylet_report::pages::diagnosis::{recording_differences, summary_sentence};
+use stylet_report::pages::diagnosis::{label_in_words, recording_differences, summary_sentence};
 use stylet_report::significant;
 use stylet_scenario::Motion;
 use stylet_tissue::effect_info;
@@ -94,10 +94,14 @@ fn diagnosis_view(d: &Diagnosis) -> Value {
     });
     let rows = d.base_parameters.iter().map(|p| {
         let whose = if p.layer == 0 { "tissue".to_owned() } else { format!("layer {}", p.layer) };
-        let remark = match (p.at_bound, p.changed) {
-            (true, _) => "at its bound",
-            (_, true) => "changed",
-            _ => "",
+        let label =
+            d.parameters.iter().find(|l| l.effect.is_none() && l.layer == p.layer && l.name == p.name);
+        let open = label.map(label_in_words).filter(|words| words != "determined");
+        let remark = match (open, p.at_bound, p.changed) {
+            (Some(open), ..) => open,
+            (None, true, _) => "at its bound".to_owned(),
+            (None, _, true) => "changed".to_owned(),
+            _ => String::new(),
         };
         let (label, unit, factor) = named(&p.name);
         let [assumed, value, low, high] = [p.assumed, p.value, p.low, p.high].map(|x| factor * x);
@@ -119,10 +123,11 @@ fn diagnosis_view(d: &Diagnosis) -> Value {
         "files": g.recordings,
         "causes": causes.collect::<Value>(),
         "gain": format!(
-            "Residual {what}: {} N before, {} N after; noise {} N.",
+            "Residual {what}: {} N before, {} N after; noise {} N. {}",
             significant(g.rmse_before_n, 3),
             significant(g.rmse_after_n, 3),
-            significant(g.floor_n, 3)
+            significant(g.floor_n, 3),
+            d.grade.as_ref().map_or_else(String::new, |grade| format!("Of the model: {}.", grade.sentence()))
         ),
         "parameters": {
             "head": ["", "parameter", "assumed", "fitted", "95 %", ""],

@@ -152,6 +152,22 @@ pub struct CheckArgs {
     pub limits: ResourceLimits,
 }
 
+/// Arguments of `stylet compare-models`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet compare-models out/monday out/tuesday
+
+Compares causes, and the parameters that both diagnoses determine with both covariances. Writes report.html and
+consistency.json.")]
+pub struct CompareModelsArgs {
+    /// Folder of a diagnosis, or its diagnosis.json.
+    pub first: PathBuf,
+    /// Another one.
+    pub second: PathBuf,
+    #[command(flatten)]
+    pub results: OutputArgs,
+}
+
 /// Arguments of `stylet identifiability`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:

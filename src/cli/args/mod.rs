@@ -14,7 +14,8 @@ pub use benchmark::{
     BenchmarkScoreArgs,
 };
 pub use diagnosis::{
-    CheckArgs, DiagnoseArgs, EffectsArgs, IdentifiabilityArgs, IdentifyArgs, PlanArgs, PredictArgs, RefitArg,
+    CheckArgs, CompareModelsArgs, DiagnoseArgs, EffectsArgs, IdentifiabilityArgs, IdentifyArgs, PlanArgs,
+    PredictArgs, RefitArg,
 };
 pub use inspect::InspectArgs;
 pub use recordings::{ConvertArgs, EnhanceArgs, ListenArgs};
@@ -66,6 +67,8 @@ pub enum Command {
     Identify(IdentifyArgs),
     /// Predict held-out recordings by the model of a diagnosis.
     Predict(PredictArgs),
+    /// Compare two diagnoses: did two sessions find the same model?
+    CompareModels(CompareModelsArgs),
     /// List which effects an experiment can identify, from which size on, and which it confuses.
     Identifiability(IdentifiabilityArgs),
     /// Plan the next insertion: the motion within limits that best separates the remaining candidate causes.

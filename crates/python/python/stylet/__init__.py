@@ -9,7 +9,7 @@ SI units everywhere; names carry their unit. Research software, not a medical de
 
 from ._core import Enhanced, Enhancer, enhance
 from ._data import read_csv
-from ._diagnosis import Diagnosis, diagnose
+from ._diagnosis import Check, Diagnosis, check, diagnose, identify
 from ._plan import Plan, plan
 from ._run import Run, Scenario, simulate
 from ._stylet import Output, StyletError, __version__
@@ -26,6 +26,7 @@ STATES = (
 """Names of the codes in a column `state`."""
 
 __all__ = [
+    "Check",
     "Diagnosis",
     "Enhanced",
     "Enhancer",
@@ -37,8 +38,10 @@ __all__ = [
     "StyletError",
     "Sweep",
     "__version__",
+    "check",
     "diagnose",
     "enhance",
+    "identify",
     "plan",
     "read_csv",
     "simulate",

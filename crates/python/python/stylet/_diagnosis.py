@@ -61,6 +61,21 @@ class Diagnosis:
         return _data.frame(self.result["base_parameters"])
 
     @property
+    def parameters(self):
+        """A table: what the recordings say about each parameter (`label`), and with which other one it trades."""
+        return _data.frame(self.result["parameters"])
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Covariance of the `parameters`, in their order and units."""
+        return np.array(self.result["covariance"])
+
+    @property
+    def grade(self) -> str:
+        """`A` to `D`; `result["grade"]["parts"]` has the reasons."""
+        return self.result["grade"]["letter"]
+
+    @property
     def extended(self) -> Scenario:
         """The scenario with re-fitted parameters and the effects found."""
         return Scenario(self._inner.extended_ron())
@@ -155,3 +170,72 @@ def diagnose(assumed, measured, *, columns=None, repair: bool = False, names=Non
     finally:
         bar.close()
     return Diagnosis(inner, kept, (columns and os.fspath(columns), repair))
+
+
+def identify(measured, *, layers: int | None = None, columns=None, repair: bool = False, names=None, progress=None) -> Diagnosis:
+    """Finds the layers that recordings show, `layers` of them or as many as there are, and diagnoses what is left.
+
+    Arguments as for `diagnose`, without a scenario. `.extended` is the phantom, `.base_parameters` its numbers. Gives the same bytes as
+    `stylet identify`."""
+    given, kept = recordings(measured, names)
+    if not given:
+        raise _stylet.StyletError("no recordings: give at least one")
+    bar = _data.Progress(True if progress is None else progress)
+    try:
+        inner = _stylet.identify(given, layers, columns and os.fspath(columns), repair, bar)
+    finally:
+        bar.close()
+    return Diagnosis(inner, kept, (columns and os.fspath(columns), repair))
+
+
+class Check:
+    """What recordings can show, before a diagnosis."""
+
+    def __init__(self, text: str, html: str):
+        self.result: dict = json.loads(text)
+        """`check.json` as a dict."""
+        self._text, self._html = text, html
+
+    @property
+    def usable(self) -> bool:
+        """Whether a diagnosis would mean anything."""
+        return all(item["light"] != "unusable" for item in self.result["items"])
+
+    @property
+    def items(self):
+        """A table: topic, light (`good`, `limited`, `unusable`), message."""
+        return _data.frame(self.result["items"])
+
+    @property
+    def parameters(self):
+        """A table: what the recordings say about each parameter of the layers."""
+        return _data.frame(self.result["parameters"])
+
+    @property
+    def effects(self):
+        """A table: effect, whether its typical size would be seen, and the smallest size that would."""
+        return _data.frame(self.result["effects"])
+
+    def json(self) -> bytes:
+        """`check.json`, the bytes that the command writes."""
+        return self._text.encode()
+
+    def html(self) -> str:
+        """The report as one HTML page."""
+        return self._html
+
+    def _repr_html_(self) -> str:
+        return _data.embedded(self.html())
+
+    def __repr__(self) -> str:
+        lights = [item["light"] for item in self.result["items"]]
+        return f"Check({', '.join(f'{lights.count(x)} {x}' for x in ('good', 'limited', 'unusable'))})"
+
+
+def check(assumed, measured, *, columns=None, repair: bool = False, names=None) -> Check:
+    """What recordings can show about an assumed scenario: data, contact, motion, parameters, effects.
+
+    Arguments as for `diagnose`. Gives the same bytes as `stylet check`."""
+    given, _ = recordings(measured, names)
+    kind, text = _data.source(assumed)
+    return Check(*_stylet.check(kind, text, given, columns and os.fspath(columns), repair))

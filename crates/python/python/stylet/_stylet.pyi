@@ -100,6 +100,20 @@ def read_csv(
     path: PathLike[str] | str, columns: PathLike[str] | str | None = None, repair: bool = False
 ) -> tuple[dict[str, _Column], list[str]]: ...
 def simulate(kind: str, source: str, seed: int | None = None, compare: bool = False) -> Run: ...
+def check(
+    kind: str,
+    source: str,
+    measured: Sequence[_Measured],
+    columns: PathLike[str] | str | None = None,
+    repair: bool = False,
+) -> tuple[str, str]: ...
+def identify(
+    measured: Sequence[_Measured],
+    layers: int | None = None,
+    columns: PathLike[str] | str | None = None,
+    repair: bool = False,
+    progress: _Progress = None,
+) -> Diagnosis: ...
 def diagnose(
     kind: str,
     source: str,

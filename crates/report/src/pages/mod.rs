@@ -12,6 +12,7 @@ pub mod formatting;
 pub mod identifiability;
 pub mod indented_specimens;
 pub mod inspection;
+pub mod model_consistency;
 pub mod prediction;
 pub mod repeated_insertions;
 pub mod sweep;

@@ -15,12 +15,13 @@ pub fn undetermined_parameters(d: &Diagnosis) -> Option<String> {
     };
     let open = d.parameters.iter().filter(|p| p.label != ParameterLabel::Determined);
     let words: Vec<String> =
-        open.filter(|p| !has_own_sentence(p)).map(|p| format!("{p} ({})", in_words(p))).collect();
+        open.filter(|p| !has_own_sentence(p)).map(|p| format!("{p} ({})", label_in_words(p))).collect();
     (!words.is_empty()).then(|| format!("these recordings do not determine {}", words.join(", ")))
 }
 
 /// The label in words.
-fn in_words(p: &LabelledParameter) -> String {
+#[must_use]
+pub fn label_in_words(p: &LabelledParameter) -> String {
     match (p.label, &p.trades_with) {
         (ParameterLabel::Determined, _) => "determined".to_owned(),
         (ParameterLabel::OneSided, _) => "bounded on one side only".to_owned(),
@@ -43,7 +44,7 @@ pub(crate) fn label_cell(
     let is_it = |p: &&LabelledParameter| p.layer == layer && p.effect.as_deref() == effect && p.name == name;
     let Some(p) = parameters.iter().find(is_it) else { return Cell::text("") };
     let status = if p.label == ParameterLabel::Determined { Status::Plain } else { Status::Warn };
-    Cell::text(in_words(p)).status(status)
+    Cell::text(label_in_words(p)).status(status)
 }
 
 /// Heat map of the correlations between the estimates; nothing for fewer than two.
