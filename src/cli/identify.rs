@@ -9,14 +9,13 @@ use std::path::{Path, PathBuf};
 use stylet_api::output_folder::{check_folder, write_file_atomically};
 use stylet_api::{DiagnosisInputs, resource_estimate};
 use stylet_diagnose::Diagnosis;
+use stylet_report::pages::diagnosis::label_in_words;
 use stylet_report::significant;
 
 /// File with the layers that the diagnosis started from.
 const FOUND_FILE: &str = "assumed.ron";
 /// First words of a phantom, by which an earlier one is recognised.
 const PHANTOM_COMMENT: &str = "// Phantom identified by stylet";
-/// Half width of an interval, relative to the value, from which the data do not determine it.
-const UNDETERMINED_SHARE: f64 = 0.5;
 
 /// `stylet identify`.
 ///
@@ -129,8 +128,9 @@ fn layers(d: &Diagnosis) -> String {
         if b.at_least {
             return Some(format!("at least {} {unit}", number(b.low)));
         }
-        let undetermined = b.high - b.low > 2.0 * UNDETERMINED_SHARE * b.value.abs() && name != "surface_m";
-        let remark = if undetermined { ", not determined" } else { "" };
+        let label = d.parameters.iter().find(|p| p.effect.is_none() && p.layer == layer && p.name == name);
+        let open = label.map(label_in_words).filter(|words| words != "determined");
+        let remark = open.map_or(String::new(), |words| format!(", {words}"));
         Some(format!("{} {unit} ({} to {}{remark})", number(b.value), number(b.low), number(b.high)))
     };
     let count = d.base_parameters.iter().map(|b| b.layer).max().unwrap_or(0);
