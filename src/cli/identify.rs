@@ -144,8 +144,12 @@ fn layers(d: &Diagnosis) -> String {
             ("b", value(layer, "friction_ns_per_m2", 1.0, "N s/m²")),
             ("ruptures at", value(layer, "puncture_n", 1.0, "N")),
         ];
-        let parts: Vec<String> =
-            parts.into_iter().filter_map(|(name, text)| Some(format!("{name} {}", text?))).collect();
+        let part = |(name, text): (&str, Option<String>)| {
+            let text = text?;
+            let name = if text.starts_with("at least") { "puncture force" } else { name };
+            Some(format!("{name} {text}"))
+        };
+        let parts: Vec<String> = parts.into_iter().filter_map(part).collect();
         let _ = writeln!(out, "  layer {layer}: {}", parts.join(", "));
     }
     out

@@ -29,8 +29,6 @@ pub(crate) struct MedianLayer {
     pub thickness_m: f64,
     /// Elastic force in N at the rupture; `None` without a rupture.
     pub rupture_n: Option<f64>,
-    /// Whether it ruptured before its far face.
-    pub by_force: bool,
 }
 
 impl FoundTissue {
@@ -60,13 +58,11 @@ impl FoundTissue {
             let median =
                 |value: fn(&FoundLayer) -> f64| median_of(chosen.iter().map(|found| value(&found[k])));
             let ruptures: Vec<f64> = chosen.iter().filter_map(|found| found[k].rupture_force_n()).collect();
-            let by_force = chosen.iter().filter(|found| found[k].is_ruptured_by_force()).count();
             MedianLayer {
                 stiffness_n_per_m: median(|l| l.stiffness_n_per_m),
                 friction_ns_per_m2: median(|l| l.friction_ns_per_m2),
                 thickness_m: median(|l| l.thickness_m).max(MIN_THICKNESS_M),
                 rupture_n: (!ruptures.is_empty()).then(|| median_of(ruptures)),
-                by_force: 2 * by_force > chosen.len(),
             }
         };
         Some(Self { surface_m, layers: (0..count).map(layer).collect() })
@@ -85,7 +81,7 @@ impl FoundTissue {
             },
             stiffness_n_per_m: l.stiffness_n_per_m.max(1e-9),
             friction_ns_per_m2: l.friction_ns_per_m2.max(1e-9),
-            puncture_n: l.rupture_n.filter(|force_n| l.by_force && *force_n > 0.0),
+            puncture_n: l.rupture_n.filter(|force_n| *force_n > 0.0),
         };
         Tissue { surface_m: self.surface_m, layers: self.layers.iter().enumerate().map(layer).collect() }
     }

@@ -281,7 +281,9 @@ pub(crate) fn base_parameters(covariance: &Covariance) -> Vec<BaseParameter> {
             _ => f64::NEG_INFINITY,
         };
         let value = (x * scale).max(reached_n);
-        let low = ((x - half) * scale).max(reached_n);
+        // Only the surface may lie below zero.
+        let least = if role == ParameterRole::Surface { f64::NEG_INFINITY } else { 0.0 };
+        let low = ((x - half) * scale).max(reached_n).max(least);
         let high = (open_above.map_or(x + half, |open| open.max(x + half)) * scale).max(value);
         out.push(BaseParameter {
             layer,
