@@ -39,11 +39,7 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
 fn text(check: &ExperimentCheck) -> String {
     let mut out = format!("{}\n\n", summary_sentence(check));
     for item in &check.items {
-        let word = match item.light {
-            Light::Good => "good",
-            Light::Limited => "limited",
-            Light::Unusable => "unusable",
-        };
+        let word = item.light.name();
         let _ = writeln!(out, "  {word:<9} {:<11} {}", item.topic, item.message);
     }
     out

@@ -9,7 +9,6 @@ use std::path::{Path, PathBuf};
 use stylet_api::output_folder::{check_folder, write_file_atomically};
 use stylet_api::{DiagnosisInputs, resource_estimate};
 use stylet_diagnose::Diagnosis;
-use stylet_report::pages::diagnosis::label_in_words;
 use stylet_report::significant;
 
 /// File with the layers that the diagnosis started from.
@@ -129,7 +128,7 @@ fn layers(d: &Diagnosis) -> String {
             return Some(format!("at least {} {unit}", number(b.low)));
         }
         let label = d.parameters.iter().find(|p| p.effect.is_none() && p.layer == layer && p.name == name);
-        let open = label.map(label_in_words).filter(|words| words != "determined");
+        let open = label.map(|p| p.label_in_words()).filter(|words| words != "determined");
         let remark = open.map_or(String::new(), |words| format!(", {words}"));
         Some(format!("{} {unit} ({} to {}{remark})", number(b.value), number(b.low), number(b.high)))
     };

@@ -41,20 +41,20 @@ pub(crate) fn search_with_baseline(
     progress("fitting the sensor's baseline");
     let first = Baseline::fit(prepared, &base, &data, false).filter(|b| leaves_noise(&b.fit, &b.data));
     let is_dominant = |b: &Baseline| base.rms_n(&data) > DOMINANT_FACTOR * b.fit.rms_n(&b.data);
-    let from_base = match &first {
-        Some(baseline) if is_dominant(baseline) => None,
-        _ => Some(Search::run(prepared, base.clone(), data.clone(), progress)),
+    let (from_base, baseline) = match first {
+        Some(baseline) if is_dominant(&baseline) => (None, baseline),
+        first => {
+            let from_base = Search::run(prepared, base.clone(), data.clone(), progress);
+            // Other effects leave only noise, and the baseline alone does not: no second search.
+            let is_enough = first.is_none() && leaves_noise(&from_base.best, &from_base.data);
+            let exchanged = || if is_enough { None } else { Baseline::fit(prepared, &base, &data, true) };
+            let Some(baseline) = first.or_else(exchanged) else {
+                return (from_base, prepared.clone());
+            };
+            (Some(from_base), baseline)
+        }
     };
-    let baseline = match (&from_base, first) {
-        (_, Some(baseline)) => Some(baseline),
-        // Other effects leave only noise, and the baseline alone does not: no second search.
-        (Some(s), None) if leaves_noise(&s.best, &s.data) => None,
-        (_, None) => Baseline::fit(prepared, &base, &data, true),
-    };
-    let Some(Baseline { prepared: with_steps, fit, data: data_of_baseline, stages }) = baseline else {
-        let s = from_base.unwrap_or_else(|| Search::run(prepared, base, data, progress));
-        return (s, prepared.clone());
-    };
+    let Baseline { prepared: with_steps, fit, data: data_of_baseline, stages } = baseline;
     let start = Search { base, stages, ..Search::from_fit(fit, data_of_baseline) };
     let mut from_baseline = Search::run_from(start, &with_steps, progress);
     remove_weak_steps(&mut from_baseline, NoiseSource::LongMemory);
@@ -111,8 +111,8 @@ impl Baseline {
         };
         // As long as more than noise is left, a drop may be a step instead of a rupture, or the reverse.
         let exchanged = |mut best: Fitted| {
-            for _ in 0..if exchange { MAX_EXCHANGES } else { 0 } {
-                if leaves_noise(&best.1, &best.2) {
+            for _ in 0..MAX_EXCHANGES {
+                if !exchange || leaves_noise(&best.1, &best.2) {
                     break;
                 }
                 let others: Vec<(f64, Fitted)> = candidates

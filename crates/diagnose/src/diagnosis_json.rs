@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use stylet_record::QualityNote;
+use stylet_stats::number_format::significant;
 
 /// Verdict of a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -140,6 +141,23 @@ impl LabelledParameter {
     }
 }
 
+impl LabelledParameter {
+    /// The label in words.
+    #[must_use]
+    pub fn label_in_words(&self) -> String {
+        match (self.label, &self.trades_with) {
+            (ParameterLabel::Determined, _) => "determined".to_owned(),
+            (ParameterLabel::OneSided, _) => "bounded on one side only".to_owned(),
+            (ParameterLabel::NotIdentifiable, _) => "not identifiable".to_owned(),
+            (ParameterLabel::AtBound, _) => "at its bound".to_owned(),
+            (ParameterLabel::TradesWith, Some(partner)) => {
+                format!("trades with {partner}, correlation {}", significant(self.correlation, 2))
+            }
+            (ParameterLabel::TradesWith, None) => "trades with others".to_owned(),
+        }
+    }
+}
+
 impl std::fmt::Display for LabelledParameter {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         match (&self.effect, self.layer) {
@@ -150,7 +168,7 @@ impl std::fmt::Display for LabelledParameter {
     }
 }
 
-/// A letter.
+/// Grade of a model, or of one part of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Letter {
     /// Predicts to the noise, from what the recordings determine.

@@ -46,6 +46,18 @@ pub enum Light {
     Unusable,
 }
 
+impl Light {
+    /// As the command and its report print it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Light::Good => "good",
+            Light::Limited => "limited",
+            Light::Unusable => "unusable",
+        }
+    }
+}
+
 /// One aspect of an experiment.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CheckItem {
@@ -237,12 +249,7 @@ fn check_parameters(out: &mut ExperimentCheck) {
         .parameters
         .iter()
         .filter(|p| p.label != ParameterLabel::Determined)
-        .map(|p| match (p.label, &p.trades_with) {
-            (ParameterLabel::TradesWith, Some(partner)) => format!("{p} (trades with {partner})"),
-            (ParameterLabel::OneSided, _) => format!("{p} (one-sided)"),
-            (ParameterLabel::AtBound, _) => format!("{p} (at its bound)"),
-            _ => p.to_string(),
-        })
+        .map(|p| format!("{p} ({})", p.label_in_words()))
         .collect();
     let total = out.parameters.len();
     if open.is_empty() {

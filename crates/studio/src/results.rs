@@ -7,7 +7,7 @@ use crate::sliders::{named, rounded};
 use crate::workspace::{LIMITS, Workspace};
 use serde_json::{Value, json};
 use stylet_api::{Diagnosis, Limits, Scenario};
-use stylet_report::pages::diagnosis::{label_in_words, recording_differences, summary_sentence};
+use stylet_report::pages::diagnosis::{recording_differences, summary_sentence};
 use stylet_report::significant;
 use stylet_scenario::Motion;
 use stylet_tissue::effect_info;
@@ -96,7 +96,7 @@ fn diagnosis_view(d: &Diagnosis) -> Value {
         let whose = if p.layer == 0 { "tissue".to_owned() } else { format!("layer {}", p.layer) };
         let label =
             d.parameters.iter().find(|l| l.effect.is_none() && l.layer == p.layer && l.name == p.name);
-        let open = label.map(label_in_words).filter(|words| words != "determined");
+        let open = label.map(|l| l.label_in_words()).filter(|words| words != "determined");
         let remark = match (open, p.at_bound, p.changed) {
             (Some(open), ..) => open,
             (None, true, _) => "at its bound".to_owned(),

@@ -190,12 +190,12 @@ fn held(out: &mut String, outcomes: &[CaseOutcome]) {
 
 /// How often 95 % intervals hold the truth, and how often they are within 10 % of the value, by what the answer says about the parameter.
 fn labelled(out: &mut String, outcomes: &[CaseOutcome]) {
-    /// Half width of an interval, relative to the value, that tells a parameter.
-    const TELLS: f64 = 0.1;
+    /// Half width of a narrow interval, relative to the value.
+    const NARROW: f64 = 0.1;
     let mut by: BTreeMap<&str, Vec<(bool, bool)>> = BTreeMap::new();
     for n in outcomes.iter().flat_map(|o| &o.numbers) {
         if let (Some(label), Some(held), Some((low, high))) = (&n.label, n.held, n.low.zip(n.high)) {
-            by.entry(label).or_default().push((held, high - low <= 2.0 * TELLS * n.value.abs()));
+            by.entry(label).or_default().push((held, high - low <= 2.0 * NARROW * n.value.abs()));
         }
     }
     if !by.is_empty() {
@@ -205,8 +205,9 @@ fn labelled(out: &mut String, outcomes: &[CaseOutcome]) {
         );
     }
     for (label, all) in &by {
-        let [held, told] = [SuccessRate::of(all, |(held, _)| *held), SuccessRate::of(all, |(_, told)| *told)];
-        let _ = writeln!(out, "    {label:<24}{held:<28}{told}");
+        let [held, close] =
+            [SuccessRate::of(all, |(held, _)| *held), SuccessRate::of(all, |(_, close)| *close)];
+        let _ = writeln!(out, "    {label:<24}{held:<28}{close}");
     }
 }
 

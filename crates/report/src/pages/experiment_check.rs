@@ -23,14 +23,14 @@ pub fn summary_sentence(check: &ExperimentCheck) -> &'static str {
 #[must_use]
 pub fn page(scenario: &Scenario, recordings: &[String], check: &ExperimentCheck) -> Page {
     let items = check.items.iter().map(|item| {
-        let (word, status) = match item.light {
-            Light::Good => ("good", Status::Good),
-            Light::Limited => ("limited", Status::Warn),
-            Light::Unusable => ("unusable", Status::Bad),
+        let status = match item.light {
+            Light::Good => Status::Good,
+            Light::Limited => Status::Warn,
+            Light::Unusable => Status::Bad,
         };
         vec![
             Cell::text(item.topic.clone()),
-            Cell::text(word).status(status),
+            Cell::text(item.light.name()).status(status),
             Cell::text(item.message.clone()),
         ]
     });

@@ -7,7 +7,7 @@ mod residual_charts;
 mod summary_sentence;
 
 pub(crate) use parameter_labels::label_cell;
-pub use parameter_labels::{label_in_words, undetermined_parameters};
+pub use parameter_labels::undetermined_parameters;
 pub use summary_sentence::{
     findings, general_forms, lower_limits, partial_model, recording_differences, summary_sentence,
 };

@@ -3,7 +3,6 @@
 use crate::page_model::{Cell, Section, Status};
 use crate::svg::{FigureOptions, HeatMap, heat_map};
 use stylet_diagnose::diagnosis_json::{Diagnosis, LabelledParameter, ParameterLabel};
-use stylet_stats::number_format::significant;
 
 /// Parameters that these recordings do not determine, in one sentence. Those at their bounds and puncture forces that were never reached
 /// have sentences of their own.
@@ -15,23 +14,8 @@ pub fn undetermined_parameters(d: &Diagnosis) -> Option<String> {
     };
     let open = d.parameters.iter().filter(|p| p.label != ParameterLabel::Determined);
     let words: Vec<String> =
-        open.filter(|p| !has_own_sentence(p)).map(|p| format!("{p} ({})", label_in_words(p))).collect();
+        open.filter(|p| !has_own_sentence(p)).map(|p| format!("{p} ({})", p.label_in_words())).collect();
     (!words.is_empty()).then(|| format!("these recordings do not determine {}", words.join(", ")))
-}
-
-/// The label in words.
-#[must_use]
-pub fn label_in_words(p: &LabelledParameter) -> String {
-    match (p.label, &p.trades_with) {
-        (ParameterLabel::Determined, _) => "determined".to_owned(),
-        (ParameterLabel::OneSided, _) => "bounded on one side only".to_owned(),
-        (ParameterLabel::NotIdentifiable, _) => "not identifiable".to_owned(),
-        (ParameterLabel::AtBound, _) => "at its bound".to_owned(),
-        (ParameterLabel::TradesWith, Some(partner)) => {
-            format!("trades with {partner}, correlation {}", significant(p.correlation, 2))
-        }
-        (ParameterLabel::TradesWith, None) => "trades with others".to_owned(),
-    }
 }
 
 /// A table's cell with the label; empty for a parameter without one.
@@ -44,7 +28,7 @@ pub(crate) fn label_cell(
     let is_it = |p: &&LabelledParameter| p.layer == layer && p.effect.as_deref() == effect && p.name == name;
     let Some(p) = parameters.iter().find(is_it) else { return Cell::text("") };
     let status = if p.label == ParameterLabel::Determined { Status::Plain } else { Status::Warn };
-    Cell::text(label_in_words(p)).status(status)
+    Cell::text(p.label_in_words()).status(status)
 }
 
 /// Heat map of the correlations between the estimates; nothing for fewer than two.
