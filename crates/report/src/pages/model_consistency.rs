@@ -46,7 +46,7 @@ pub fn page(names: &[String; 2], c: &Consistency) -> Page {
         .fact("stylet", env!("CARGO_PKG_VERSION"))
         .section(Section::new("Parameters").table(Table::new(
             "Parameters that both determine",
-            &["parameter", "first", "second", "difference, 95 %", "if there is none"],
+            &["parameter", "first", "second", "difference, 95 %", "p-value"],
             rows.collect(),
         )))
 }
