@@ -378,7 +378,7 @@ pub struct Diagnosis {
     /// Whether the simulation agrees with the data: no effect is missing, and no finding contradicts.
     #[serde(default)]
     pub agrees: bool,
-    /// Grade of the extended model; `None` for data sets of repeats and specimens.
+    /// Grade of the extended model; `None` for data sets of specimens.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grade: Option<Grade>,
     /// Findings that contradict agreement, or that limit the confidence.

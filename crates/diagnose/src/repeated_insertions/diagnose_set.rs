@@ -18,6 +18,7 @@ use crate::diagnosis_json::{
     Cause, Diagnosis, Estimate, Gain, NegligibleEffect, NoiseReport, RandomEffectSd, ResidualStructureReport,
     SearchCandidate, SearchStep, Verdict,
 };
+use crate::model_grade::grade;
 use crate::residual_tests;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
@@ -251,6 +252,7 @@ fn diagnosis(
     };
     // The floor is what recordings predict of each other, so scatter between them is in it.
     claims::apply(&mut diagnosis, &Context::default());
+    diagnosis.grade = Some(grade(&diagnosis, 0.0));
     diagnosis
 }
 
