@@ -51,6 +51,10 @@ pub struct EffectVisibility {
     pub effect: String,
     /// Whether its typical size would be seen.
     pub visible: bool,
+    /// Nats that its typical size would gain.
+    pub nats: f64,
     /// Parameters at the smallest size that would be seen; `None` when no plausible size would.
     pub smallest: Option<BTreeMap<String, f64>>,
+    /// Parameters at the size below which it would be missed; `None` when at every plausible size.
+    pub hidden_below: Option<BTreeMap<String, f64>>,
 }

@@ -2,25 +2,38 @@
 
 use crate::check_json::EffectVisibility;
 use crate::diagnosis_json::Cause;
+use crate::geometry_selection::free_geometry;
 use crate::motion_period::common_motion_period_s;
 use rayon::prelude::*;
-use stylet_identify::fit::Fit;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::EffectTerm;
 use stylet_identify::score_test::{ScoreTest, scale_strengths};
 use stylet_tissue::{ChainStage, EffectInfo, FitScale, Proposal, general_effects};
 
-/// An effect of typical size that would gain less than this many nats is not identifiable.
-const MIN_DETECTABLE_NATS: f64 = 10.0;
-
+/// Nats that the search requires of an effect with two parameters, about.
+const REQUIRED_NATS: f64 = 12.0;
+/// Nats from which an effect is named in most cases: a gain, a significant strength and a better prediction of held-out recordings are
+/// required of it together.
+const SEEN_NATS: f64 = 100.0;
 /// Largest multiple of an effect's typical size that is plausible.
 const MAX_PLAUSIBLE_FACTOR: f64 = 30.0;
+/// Steps to the size with wanted nats.
+const SIZE_STEPS: usize = 3;
 
 /// From which size on each effect that a fit does not contain would be seen beside it; without the effects that have no column to test.
+///
+/// The geometry is free and the priors about the parameters of the layers are weak: what follows from their tolerance alone is no
+/// evidence. Effects that resemble each other are not distinguished here; the diagnosis lists them as equivalent.
 #[must_use]
-pub fn visible_effects(fit: &Fit, data: &FitData) -> Vec<EffectVisibility> {
-    let score_test = ScoreTest::new(fit, data);
-    let missing: Vec<&'static EffectInfo> = missing_effects(fit).collect();
+pub fn visible_effects(best: &Fit, data: &FitData) -> Vec<EffectVisibility> {
+    let mut model = free_geometry(&best.model);
+    model.assumed = Arc::new(model.assumed.with_weak_priors());
+    let fit = fit(&model, data, Effort { max_iterations: 3, min_gain_nats: 0.1 });
+    let score_test = ScoreTest::new(fit.as_ref().unwrap_or(best), data);
+    let missing: Vec<&'static EffectInfo> = missing_effects(best).collect();
     missing.par_iter().filter_map(|info| visibility(info, &score_test)).collect()
 }
 
@@ -30,19 +43,33 @@ fn missing_effects(fit: &Fit) -> impl Iterator<Item = &'static EffectInfo> + '_ 
 
 fn visibility(info: &'static EffectInfo, score_test: &ScoreTest) -> Option<EffectVisibility> {
     let (values, nats) = typical_size(info, score_test)?;
-    let factor = (MIN_DETECTABLE_NATS / nats.max(1e-12)).sqrt();
-    let smallest = (factor <= MAX_PLAUSIBLE_FACTOR).then(|| {
-        let scaled = scale_strengths(info, &[&values], &[factor]);
-        info.parameters.iter().map(|p| p.path.to_owned()).zip(scaled).collect()
-    });
-    Some(EffectVisibility { effect: info.id.to_owned(), visible: nats >= MIN_DETECTABLE_NATS, smallest })
+    let scaled = |factor: f64| scale_strengths(info, &[&values], &[factor]);
+    let size_at = |wanted_nats: f64| -> Option<BTreeMap<String, f64>> {
+        let (mut factor, mut at) = (1.0, nats);
+        for _ in 0..SIZE_STEPS {
+            factor *= (wanted_nats / at.max(1e-12)).sqrt();
+            if factor > MAX_PLAUSIBLE_FACTOR {
+                return None;
+            }
+            let column = score_test.effect_column(&EffectTerm::new(info, &scaled(factor)))?;
+            at = score_test.gain(&[column]).detectable_nats;
+        }
+        Some(info.parameters.iter().map(|p| p.path.to_owned()).zip(scaled(factor)).collect())
+    };
+    Some(EffectVisibility {
+        effect: info.id.to_owned(),
+        visible: nats >= SEEN_NATS,
+        nats,
+        smallest: size_at(SEEN_NATS),
+        hidden_below: size_at(0.5 * REQUIRED_NATS),
+    })
 }
 
 /// Effects that are not identifiable from these recordings, in the order of the library; `visible` are those with a column to test.
 #[must_use]
 pub fn not_identifiable(best: &Fit, data: &FitData, visible: &[EffectVisibility]) -> Vec<String> {
     let is_identifiable = |info: &EffectInfo| match visible.iter().find(|v| v.effect == info.id) {
-        Some(v) => v.visible,
+        Some(v) => v.nats >= REQUIRED_NATS,
         // Free thicknesses absorb a shifted layer boundary.
         None if matches!(info.proposal, Proposal::LayerFaces(_)) => !best.model.free.thickness,
         None => !has_clock(info) || common_motion_period_s(data).is_none(),

@@ -6,7 +6,6 @@ use crate::diagnosis_json::{Diagnosis, Finding, FindingKind, Verdict};
 use crate::error::DiagnoseError;
 use crate::found_tissue::FoundTissue;
 use crate::input_checks::{CleanRecordings, NamedRecording, check_length, clean_recordings};
-use crate::measured_start::TOLERANCE;
 use stylet_identify::model::Assumptions;
 use stylet_scenario::{Motion, Scenario};
 use stylet_score::MIN_FORCE_SHARE;
@@ -137,6 +136,7 @@ pub fn scenario_from_recordings(
         return Err(DiagnoseError::FewerLayers { asked, found: found.layers.len() });
     }
     let mut scenario = Scenario::new(name.to_owned(), found.tissue(), Motion::Recorded);
-    (scenario.tolerance, scenario.thickness_tolerance) = (TOLERANCE, Assumptions::GUESSED_TOLERANCE);
+    (scenario.tolerance, scenario.thickness_tolerance) =
+        (Assumptions::WEAK_TOLERANCE, Assumptions::GUESSED_TOLERANCE);
     Ok(scenario)
 }

@@ -11,8 +11,6 @@ use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{Assumptions, MAX_TOLERANCES_WIDE};
 use stylet_record::Recording;
 
-/// Relative tolerance of stiffness, friction and puncture force about a value from the data.
-pub(crate) const TOLERANCE: f64 = 1.0;
 /// Smallest value of a parameter, as a share of the assumed one: none of them is zero.
 const MIN_SHARE_OF_ASSUMED: f64 = 1e-3;
 /// A fit that leaves a residual smaller by this factor is better, even if it does not explain the force.
@@ -106,11 +104,9 @@ fn is_out_of_tolerance(assumed: &Assumptions, fit: &Fit) -> bool {
 /// The assumed tissue with the numbers that were found, under weak priors. Layers that the needle did not reach keep the assumed
 /// numbers.
 fn assumptions_from(found: &FoundTissue, assumed: &Assumptions) -> Assumptions {
-    let mut out = assumed.clone();
+    let mut out = assumed.with_weak_priors();
     out.tissue.surface_m = found.surface_m;
     for (k, layer) in out.tissue.layers.iter_mut().enumerate() {
-        out.tolerance[k] = TOLERANCE;
-        out.thickness_tolerance[k] = Assumptions::GUESSED_TOLERANCE;
         let Some(l) = found.layers.get(k) else { continue };
         let replace = |x: &mut f64, value: f64| *x = value.max(MIN_SHARE_OF_ASSUMED * *x);
         replace(&mut layer.stiffness_n_per_m, l.stiffness_n_per_m);

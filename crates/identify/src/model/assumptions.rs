@@ -19,6 +19,18 @@ impl Assumptions {
     /// Relative tolerance of a thickness from which it is a guess.
     pub const GUESSED_TOLERANCE: f64 = 0.5;
 
+    /// Relative tolerance of stiffness, friction and puncture force about a value that is only guessed.
+    pub const WEAK_TOLERANCE: f64 = 1.0;
+
+    /// The same tissue with weak priors about its layers.
+    #[must_use]
+    pub fn with_weak_priors(&self) -> Self {
+        let mut out = self.clone();
+        out.tolerance.fill(Self::WEAK_TOLERANCE);
+        out.thickness_tolerance.fill(Self::GUESSED_TOLERANCE);
+        out
+    }
+
     /// Whether no thickness is known: where a layer boundary is found then tells nothing about an effect that would move it.
     #[must_use]
     pub fn is_geometry_guessed(&self) -> bool {
