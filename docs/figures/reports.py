@@ -62,7 +62,6 @@ PICTURES = [
     ("predict_bad", "predict-bad/report.html", "chart", "measured minus predicted"),
     ("plan_force", "plan.html", "chart", "Expected force under each candidate"),
     ("sweep_noise", "sweep/report.html", "chart", "Failed insertions by sensor.noise_n"),
-    ("sweep_sensitivity", "sweep/report.html", "section", "Worst trials"),
 ]
 
 

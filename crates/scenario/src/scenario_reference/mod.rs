@@ -154,16 +154,15 @@ fn range(p: &ParameterInfo) -> String {
 /// Names, equations and places of all effects: the table in `docs/reference/model.md`.
 #[must_use]
 pub fn effects_table() -> String {
-    let mut table = "| effect | acts on | equation | source |\n|---|---|---|---|\n".to_owned();
+    let mut table = "| effect | acts on | equation |\n|---|---|---|\n".to_owned();
     for info in all_effects() {
         let place = format!("{:?}", info.stage).to_lowercase();
         let _ = writeln!(
             table,
-            "| [`{}`](effects.md#{}) | {place} | `{}` | {} |",
+            "| [`{}`](effects.md#{}) | {place} | `{}` |",
             info.id,
             info.id,
-            info.equation.replace('|', "\\|"),
-            info.source
+            info.equation.replace('|', "\\|")
         );
     }
     table
