@@ -170,6 +170,8 @@ def matches(wanted, printed):
 
 def run_tutorials(binary):
     python = os.environ.get("PYTHON", "python3")
+    if not shutil.which(python):
+        python = "python3"
     has_module = subprocess.run([python, "-c", "import stylet"], capture_output=True).returncode == 0
     ran = 0
     for page in sorted((DOCS / "tutorials").glob("*.md")):
