@@ -86,7 +86,8 @@ fn rows(page: &str) -> Vec<Vec<String>> {
 #[test]
 fn every_constant_of_the_diagnosis_stands_in_the_table_with_its_value_and_reason() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let page = std::fs::read_to_string(root.join("docs/reference/constants.md")).expect("docs/reference/constants.md");
+    let page = std::fs::read_to_string(root.join("docs/reference/constants.md"))
+        .expect("docs/reference/constants.md");
     let (mut documented, mut faults) = (Constants::new(), Vec::new());
     let mut kinds: BTreeMap<String, usize> = BTreeMap::new();
     let (mut choices, mut of_sets) = (0, 0);
