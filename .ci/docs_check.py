@@ -3,7 +3,8 @@
 
 1. The book builds without warnings, where mdbook is installed.
 2. Every page is in SUMMARY.md; every relative link and anchor leads somewhere; every `docs/...` path in the sources exists.
-3. docs/reference/commands.md is what --help says; every flag named in README and book exists; every command is named in the README or the book.
+3. docs/reference/commands.md is what --help says; every flag named in README and book exists; every command is named in the README or the book; every
+   message in docs/reference/errors.md stands in the sources.
 4. Every ```sh block of the tutorials runs, in order, in a temporary folder per page, and prints the ```text block behind it.
 5. No misspelt word, where typos is installed.
 
@@ -147,6 +148,17 @@ def check_commands(binary):
     print(f"docs: {len(usage)} commands, {sum(map(len, flags.values()))} flags")
 
 
+def check_messages():
+    """The messages in the table of errors stand in the sources."""
+    sources = "".join(p.read_text() for folder in ("crates", "src") for p in sorted((ROOT / folder).rglob("*.rs")) if "tests" not in p.parts)
+    sources = re.sub(r"\\\n\s*", "", sources)
+    table = (DOCS / "reference/errors.md").read_text().split("| message contains |")[1]
+    for row in re.findall(r"^\| (`.*?) \|", table, re.M):
+        for message in re.findall(r"`([^`]+)`", row):
+            if message not in sources:
+                fault(f"docs/reference/errors.md: no source has the message {message!r}")
+
+
 # 4
 
 def matches(wanted, printed):
@@ -253,6 +265,7 @@ if __name__ == "__main__":
     build_book()
     check_links()
     check_commands(binary)
+    check_messages()
     check_spelling()
     run_tutorials(binary)
     count_words()
