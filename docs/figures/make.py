@@ -246,6 +246,8 @@ def smaller(text, tolerance=0.5):
 
 def compact(text):
     """A figure without metadata, comments and digits of coordinates that no screen shows."""
+    if text.startswith('<svg text-anchor="middle"') or 'class="k0"' in text:
+        return text  # done before
     text = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>", "", text, flags=re.S)
 
     def coordinates(match):
@@ -253,6 +255,20 @@ def compact(text):
 
     text = re.sub(r'\b(d|x|y|width|height)="[^"]*"', coordinates, text)
     text = re.sub(r' (class|style)=""', "", text)
+    # Drawings of matplotlib: repeated styles become classes, names become short, groups lose theirs.
+    styles = sorted({s for s in re.findall(r'style="([^"]*)"', text) if text.count(s) > 2})
+    for k, style in enumerate(styles):
+        text = text.replace(f'style="{style}"', f'class="k{k}"')
+    if styles:
+        rules = "".join(f".k{k}{{{s}}}" for k, s in enumerate(styles))
+        text = text.replace("</style>", f"{rules}</style>", 1)
+    text = text.replace("DejaVuSans-", "d").replace("xlink:href", "href")
+    used = set(re.findall(r"[#(]#?([\w.-]+)", text))
+    text = re.sub(r' id="([\w.-]+)"', lambda m: m.group() if m.group(1) in used else "", text)
+    # Centred text is the default where most texts are.
+    if 2 * text.count('text-anchor="middle"') > text.count("<text"):
+        text = re.sub(r"<text(?![^>]*text-anchor)", '<text text-anchor="start"', text).replace(' text-anchor="middle"', "")
+        text = text.replace("<svg ", '<svg text-anchor="middle" ', 1)
     return re.sub(r">\s+<", "><", re.sub(r"[ \n]+", " ", text))
 
 
