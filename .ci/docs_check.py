@@ -8,7 +8,8 @@
 4. Every ```sh block of the tutorials runs, in order, in a temporary folder per page, and prints the ```text block behind it.
 5. No misspelt word, where typos is installed.
 
-In a page, `<!-- file: NAME -->` in front of a code block saves it under that name; `<!-- not run: reason -->` in front of an ```sh block skips it.
+In a page, `<!-- file: NAME -->` in front of a code block saves it under that name; `<!-- not run: reason -->` in front of an ```sh block skips it, `<!-- exit code 2 -->` expects
+that exit code.
 In an expected output a line `...` stands for any lines, and `...` inside a line for any text. Python blocks of the tutorials run where `import stylet` works in $PYTHON (python3).
 """
 
@@ -23,6 +24,7 @@ import urllib.parse
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.dont_write_bytecode = True
 import commands_page  # noqa: E402
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -223,7 +225,8 @@ def run_tutorials(binary):
                 done = subprocess.run(command, cwd=work, env=env, capture_output=True, text=True)
                 printed = done.stdout.rsplit("\x00", 1)[-1] + done.stderr
                 ran += 1
-                if done.returncode:
+                wanted = int(marker[10:]) if marker.startswith("exit code ") else 0
+                if done.returncode != wanted:
                     fault(f"{page.name}: exit code {done.returncode}: {code}\n{printed}")
         print(f"docs: {page.name}: {time.monotonic() - start:.1f} s")
     print(f"docs: {ran} blocks ran")

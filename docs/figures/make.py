@@ -17,6 +17,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+sys.dont_write_bytecode = True
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 INK, SOFT, LINE, BLUE, GREY, ORANGE = "#1b1f24", "#5a636d", "#d9dde2", "#0072b2", "#9aa3ad", "#d55e00"
