@@ -104,6 +104,8 @@ def check_links():
             file = (page.parent / path).resolve() if path else page
             if not file.exists():
                 fault(f"{page.relative_to(ROOT)}: no file {target}")
+            elif page.is_relative_to(DOCS) and not file.is_relative_to(DOCS):
+                fault(f"{page.relative_to(ROOT)}: {target} is outside the book, where the built pages have no link")
             elif anchor and file.suffix == ".md" and anchor not in anchors(file):
                 fault(f"{page.relative_to(ROOT)}: no heading {target}")
     listed = subprocess.run(["git", "ls-files", "-co", "--exclude-standard"], cwd=ROOT, capture_output=True, text=True).stdout.split("\n")
