@@ -86,7 +86,7 @@ fn a_varied_speed_determines_both_and_shows_more_effects() {
 }
 
 #[test]
-fn recordings_that_are_no_insertion_end_with_exit_code_1_and_a_report() {
+fn check_reports_recordings_that_are_no_insertion_and_diagnose_refuses_them_unless_forced() {
     let scratch = Scratch::new("check-unusable");
     let (assumed, recording) = recorded(&scratch, "one", ONE_SPEED);
     let changed = |name: &str, change: fn([f64; 3]) -> [f64; 3]| {
@@ -100,16 +100,30 @@ fn recordings_that_are_no_insertion_end_with_exit_code_1_and_a_report() {
         text(&scratch.file(name, format!("time_s,position_m,force_n\n{}", rows.collect::<String>())))
     };
     let cases = [
-        (changed("mm.csv", |[t, z, f]| [t, 1e3 * z, f]), "millimetres"),
-        (changed("air.csv", |[t, z, _]| [t, z, 0.01 * (1e3 * t).sin()]), "never touches"),
+        (changed("mm.csv", |[t, z, f]| [t, 1e3 * z, f]), "millimetres", 2),
+        (changed("air.csv", |[t, z, _]| [t, z, 0.01 * (1e3 * t).sin()]), "never touches", 1),
     ];
-    for (file, reason) in cases {
+    for (file, reason, code) in cases {
         let out = format!("{file}-out");
         let output = stylet(&["check", &assumed, "--data", &file, "--out", &out]);
         assert_eq!(output.status.code(), Some(1), "{}", stderr_text(&output));
         let said = String::from_utf8_lossy(&output.stdout);
         assert!(said.contains("unusable") && said.contains(reason), "{said}");
         assert!(fs::exists(format!("{out}/report.html")).expect("a folder"));
+        let out = format!("{file}-diagnosis");
+        let arguments = ["diagnose", &assumed, "--data", &file, "--out", &out];
+        let refused = stylet(&arguments);
+        assert_eq!(refused.status.code(), Some(code), "{}", stderr_text(&refused));
+        assert!(stderr_text(&refused).contains(reason), "{}", stderr_text(&refused));
+        assert!(!fs::exists(&out).expect("a folder"));
+        let forced = stylet(&[&arguments[..], &["--force"]].concat());
+        assert!(forced.status.success(), "{}", stderr_text(&forced));
+        let json = fs::read_to_string(format!("{out}/diagnosis.json")).expect("a file");
+        let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+        assert_eq!(
+            (&json["agrees"], &json["findings"][0]["kind"]),
+            (&serde_json::json!(false), &serde_json::json!("unusable"))
+        );
     }
 }
 
@@ -142,4 +156,26 @@ fn two_sessions_of_one_tissue_are_one_model_and_a_softer_layer_is_found() {
     assert!(said.starts_with("Both are one model"), "{said}");
     let said = compared(&session("wednesday", &softer, ["5", "6"]));
     assert!(said.starts_with("The models differ: they differ in stiffness_n_per_m of layer 2."), "{said}");
+}
+
+#[test]
+fn recordings_of_different_stiffness_are_found_to_differ_and_those_of_one_are_not() {
+    let scratch = Scratch::new("check-by-recording");
+    let (assumed, first) = recorded(&scratch, "first", VARIED);
+    let warning = |name: &str, stiffness: &str| {
+        let file = text(&scratch.file(
+            &format!("{name}.ron"),
+            scenario(VARIED).replace("stiffness_n_per_m: 90.0", &format!("stiffness_n_per_m: {stiffness}")),
+        ));
+        let out = text(&scratch.path().join(name));
+        let run = stylet(&["run", &file, "--seed", "7", "--quiet", "--out", &out]);
+        assert!(run.status.success(), "{}", stderr_text(&run));
+        let second = format!("{out}/recording.csv");
+        let found =
+            stylet(&["diagnose", &assumed, "--data", &first, &second, "--out", &format!("{out}-diagnosis")]);
+        assert!(found.status.success(), "{}", stderr_text(&found));
+        String::from_utf8_lossy(&found.stdout)
+            .contains("the recordings differ in stiffness_n_per_m of layer 2")
+    };
+    assert_eq!((warning("one", "90.0"), warning("other", "93.0")), (false, true));
 }

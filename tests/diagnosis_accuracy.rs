@@ -170,9 +170,14 @@ fn two_time_constants_of_relaxation_are_identified() {
             .expect("a case");
         assert!(truth[0].0.starts_with("terms.0.") && truth.len() == 2 * terms, "{truth:?}");
         let (assumed, recordings) = inputs(&case.question).expect("a scenario");
-        let found = stylet_diagnose::diagnose(&assumed, &recordings, &Options { brief: true }, |_| {})
-            .expect("a diagnosis")
-            .diagnosis;
+        let found = stylet_diagnose::diagnose(
+            &assumed,
+            &recordings,
+            &Options { brief: true, ..Options::default() },
+            |_| {},
+        )
+        .expect("a diagnosis")
+        .diagnosis;
         let [cause] = found.causes.as_slice() else { panic!("{:?}", found.causes) };
         assert_eq!((cause.effect.as_str(), cause.parameters.len()), ("stress_relaxation", 2 * terms));
         for (path, value) in truth {
@@ -189,8 +194,13 @@ fn the_model_of_a_diagnosis_predicts_a_held_out_recording_to_about_its_noise() {
         let case = stylet_examine::make_case(&id).expect("a case");
         let (assumed, mut recordings) = inputs(&case.question).expect("a scenario");
         let kept = recordings.split_off(recordings.len() - 1);
-        let found = stylet_diagnose::diagnose(&assumed, &recordings, &Options { brief: true }, |_| {})
-            .expect("a diagnosis");
+        let found = stylet_diagnose::diagnose(
+            &assumed,
+            &recordings,
+            &Options { brief: true, ..Options::default() },
+            |_| {},
+        )
+        .expect("a diagnosis");
         let predicted = predict(&found.extended_scenario, Some(&found.diagnosis), Some(&assumed), &[], &kept)
             .expect("a prediction");
         let p = &predicted.prediction;

@@ -207,8 +207,9 @@ fn files_written_by_stylet_are_read_again_or_refused() {
         recording: run.simulation.recording.clone(),
         notes: Vec::new(),
     }];
-    let diagnosis =
-        stylet::diagnose(&scenario, &evidence, |_| {}).and_then(|d| d.json()).expect("a diagnosis");
+    let diagnosis = stylet::diagnose(&scenario, &evidence, &stylet::DiagnoseOptions::default(), |_| {})
+        .and_then(|d| d.json())
+        .expect("a diagnosis");
     let whole = [diagnosis];
     fuzz("diagnosis", 6_000, &whole, |bytes| {
         let text = String::from_utf8_lossy(bytes);
@@ -315,7 +316,7 @@ fn short_recordings_are_diagnosed_or_refused() {
             return false;
         };
         let evidence = [NamedRecording { name: "a.csv".to_owned(), recording, notes }];
-        match stylet::diagnose(&scenario, &evidence, |_| {}) {
+        match stylet::diagnose(&scenario, &evidence, &stylet::DiagnoseOptions::default(), |_| {}) {
             Ok(found) => found.json().is_ok() && found.extended_ron("gel.ron").is_ok(),
             Err(why) => !why.to_string().is_empty() && !matches!(why, stylet::Error::Internal(_)),
         }

@@ -5,7 +5,8 @@ use crate::cli::exit_codes::Failure;
 use std::fmt::Write as _;
 use stylet_api::output_folder::check_folder;
 use stylet_api::{DiagnosisInputs, Scenario, resource_estimate};
-use stylet_diagnose::experiment_check::{ExperimentCheck, Light};
+use stylet_diagnose::check_json::Light;
+use stylet_diagnose::experiment_check::ExperimentCheck;
 use stylet_report::pages::experiment_check::summary_sentence;
 
 /// `stylet check`.

@@ -5,7 +5,7 @@ use crate::cli::diagnosis_summary::summary;
 use crate::cli::exit_codes::Failure;
 use crate::cli::terminal_output::stage_printer;
 use stylet_api::output_folder::{check_folder, recover_parent};
-use stylet_api::resource_estimate;
+use stylet_api::{DiagnoseOptions, resource_estimate};
 use stylet_scenario::Scenario;
 
 /// The command.
@@ -42,7 +42,8 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let estimate = resource_estimate::estimate_diagnose_samples(&samples);
     args.limits.check(file, &estimate, true)?;
     let limit = args.limits.start_time_limit(file);
-    let found = stylet_api::diagnose(&scenario, &recordings, progress)?;
+    let options = DiagnoseOptions { force: args.force, ..DiagnoseOptions::default() };
+    let found = stylet_api::diagnose(&scenario, &recordings, &options, progress)?;
     drop(limit);
     let output = found.output(&scenario, &inputs)?.with_inputs(read);
     args.results.write_and_print(&folder, &output, || summary(&found.diagnosis))

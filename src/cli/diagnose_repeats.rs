@@ -52,6 +52,9 @@ fn summary(study: &SetDiagnosis) -> String {
     let mut out = String::new();
     let (d, r) = (&study.diagnosis, &study.report);
     let _ = writeln!(out, "{}\n", summary_sentence(study));
+    if let Some(grade) = &d.grade {
+        let _ = writeln!(out, "  {}", grade.sentence());
+    }
     let _ = writeln!(
         out,
         "  candidate models and components of the selected one (N rms on held-out parts of the set)\n    {:<40} {:.3}",

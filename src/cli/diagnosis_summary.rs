@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use stylet_diagnose::Diagnosis;
 use stylet_report::pages::diagnosis::{
-    findings, general_forms, lower_limits, partial_model, recording_differences, summary_sentence,
-    undetermined_parameters,
+    different_recordings, findings, general_forms, lower_limits, partial_model, recording_differences,
+    summary_sentence, undetermined_parameters,
 };
 use stylet_report::significant;
 
@@ -63,7 +63,7 @@ pub fn summary(d: &Diagnosis) -> String {
     for sentence in lower_limits(d) {
         let _ = writeln!(out, "  {sentence}");
     }
-    if let Some(sentence) = undetermined_parameters(d) {
+    for sentence in undetermined_parameters(d).into_iter().chain(different_recordings(d)) {
         let _ = writeln!(out, "  {sentence}");
     }
     if let Some(differ) = recording_differences(d) {

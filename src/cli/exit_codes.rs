@@ -70,6 +70,7 @@ impl Failure {
     pub fn code(&self) -> ExitCode {
         ExitCode::from(match self {
             Failure::Work(why) if matches!(**why, stylet_api::Error::Internal(_)) => INTERNAL,
+            Failure::Work(why) if why.is_unusable() => CHECK_FAILED,
             Failure::Work(_) | Failure::Stdout(_) | Failure::Check(_) => INPUT_WRONG,
             Failure::Gate { .. } | Failure::Unusable(_) => CHECK_FAILED,
         })

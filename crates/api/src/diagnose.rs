@@ -78,15 +78,20 @@ impl DiagnosisReport {
 /// the gain is measured on held-out recordings. Very long recordings are downsampled first, and the diagnosis notes it.
 ///
 /// # Errors
-/// [`Error::Recording`] when a recording is unusable (a dead or reversed sensor, millimetres for metres, ...),
+/// Unless `options.force`: [`Error::Recording`] when a recording is unusable (a dead or reversed sensor, millimetres for metres, ...),
 /// [`Error::Diagnose`] when the recordings do not fit the scenario.
 pub fn diagnose(
     assumed: &Scenario,
     recordings: &[NamedRecording],
+    options: &Options,
     progress: impl FnMut(&str),
 ) -> Result<DiagnosisReport, Error> {
-    let recordings = usable_recordings(recordings)?;
-    Ok(DiagnosisReport::new(stylet_diagnose::diagnose(assumed, &recordings, &Options::default(), progress)?))
+    let recordings = if options.force {
+        recordings.iter().map(downsampled).collect()
+    } else {
+        usable_recordings(recordings)?
+    };
+    Ok(DiagnosisReport::new(stylet_diagnose::diagnose(assumed, &recordings, options, progress)?))
 }
 
 /// Finds the layers that recordings show, `layers` of them or as many as there are, and diagnoses what is left: the scenario that it

@@ -142,6 +142,12 @@ impl From<ShardError> for Error {
 }
 
 impl Error {
+    /// Whether the inputs are right, but a diagnosis of the recordings would mean nothing.
+    #[must_use]
+    pub fn is_unusable(&self) -> bool {
+        matches!(self, Self::Diagnose(stylet_diagnose::DiagnoseError::Unusable { .. }))
+    }
+
     /// Why planning failed, with the file concerned.
     pub(crate) fn of_plan(file: &Path, why: PlanError) -> Self {
         match why {

@@ -56,7 +56,7 @@ pub use sweep::{SweepResult, sweep};
 
 pub use stylet_core::{EnhanceConfig, Enhancer, Sample};
 pub use stylet_diagnose::prediction::{Prediction, PredictionResult, Refit};
-pub use stylet_diagnose::{Diagnosis, NamedRecording};
+pub use stylet_diagnose::{Diagnosis, NamedRecording, Options as DiagnoseOptions};
 pub use stylet_plan::Limits;
 pub use stylet_record::{ColumnMap, ReadOptions, Recording, read_csv};
 pub use stylet_scenario::{EnhancerConfigFile, Scenario};

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::output_files::{OutputFiles, one_line, to_json_bytes};
 use crate::output_folder::{check_own_file, write_file_atomically};
 use std::path::Path;
-use stylet_diagnose::NamedRecording;
+use stylet_diagnose::{NamedRecording, Options};
 use stylet_plan::identifiability::Identifiability;
 use stylet_plan::{InformationState, Limits, Plan};
 use stylet_report::pages::{diagnosis, experiment_plan as plan_page, identifiability as shown_page};
@@ -65,7 +65,7 @@ pub fn plan_after_recordings(
     let (diagnosed, (ground, begin)) = if recordings.is_empty() {
         (None, stylet_plan::from_scenario(&scenario, None).map_err(failed)?)
     } else {
-        let report = diagnose(&scenario, recordings, |stage| progress(stage))?;
+        let report = diagnose(&scenario, recordings, &Options::default(), |stage| progress(stage))?;
         let start = stylet_plan::from_diagnosis(&scenario, &report.details).map_err(failed)?;
         (Some(report), start)
     };
@@ -171,7 +171,7 @@ pub fn identifiability(
     let ground = if recordings.is_empty() {
         stylet_plan::from_scenario(&scenario, None).map_err(failed)?.0
     } else {
-        let report = diagnose(&scenario, &recordings, |stage| progress(stage))?;
+        let report = diagnose(&scenario, &recordings, &Options::default(), |stage| progress(stage))?;
         stylet_plan::starting_information::from_recordings(&scenario, &report.details).map_err(failed)?
     };
     Ok(IdentifiabilityReport { identifiability: stylet_plan::identifiability(&ground), scenario })

@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             } else {
                 disturbed_case(kind, seed, index, recordings)?
             };
-            let d = match diagnose(&scenario, &data, &Options { brief: true }, |_| {}) {
+            let d = match diagnose(&scenario, &data, &Options { brief: true, ..Options::default() }, |_| {}) {
                 Ok(result) => result.diagnosis,
                 Err(error) => {
                     println!("{kind} {index}: {error}");

@@ -11,6 +11,20 @@ use stylet_identify::model::{Assumptions, EffectTerm, Model, ZeroStep};
 use stylet_identify::noise::{Noise, NoiseSource};
 use stylet_identify::rupture_assignment::assign_ruptures;
 use stylet_identify::update_event_times::update_event_times;
+use stylet_scenario::Scenario;
+
+/// Prior of a scenario: its tissue, effects and tolerances.
+#[must_use]
+pub fn assumptions_of(s: &Scenario) -> Assumptions {
+    let layers = s.tissue.layers.len();
+    Assumptions {
+        tissue: s.tissue.clone(),
+        known_effects: s.effects.clone(),
+        tolerance: vec![s.tolerance; layers],
+        thickness_tolerance: vec![s.thickness_tolerance; layers],
+        surface_tolerance_m: s.surface_tolerance_m,
+    }
+}
 
 /// Recordings in blocks, with the detected drops of their forces.
 #[derive(Clone, Debug)]

@@ -4,6 +4,7 @@
 //! parameters and the scatter between recordings. Whatever it finds stands in [`Diagnosis::findings`], so that no sentence
 //! contradicts a number beside it.
 
+use crate::check_json::Light;
 use crate::diagnosis_json::{BaseParameter, Diagnosis, Finding, FindingKind, Gain, Verdict};
 use stylet_record::{QualityKind, Recording};
 use stylet_scenario::Scenario;
@@ -77,6 +78,9 @@ fn max_confidence(findings: &[Finding]) -> f64 {
 fn findings(d: &Diagnosis, context: &Context) -> Vec<Finding> {
     let mut out = Vec::new();
     let mut add = |kind: FindingKind, message: String| out.push(Finding { kind, message });
+    for item in d.check.iter().filter(|item| item.light == Light::Unusable) {
+        add(FindingKind::Unusable, format!("diagnosed although it means nothing: {}", item.message));
+    }
     for b in d.base_parameters.iter().filter(|b| b.out_of_tolerance) {
         add(FindingKind::OutOfTolerance, out_of_tolerance(b));
     }

@@ -69,7 +69,7 @@ impl<'a> Covariance<'a> {
     }
 
     /// Covariance with known noise.
-    fn with_known_noise(fit: &'a Fit, data: &FitData) -> Self {
+    pub(crate) fn with_known_noise(fit: &'a Fit, data: &FitData) -> Self {
         let mut tangent = Linearization::new(&fit.model, data, &fit.residuals);
         let mut wide_m = 0.0;
         for _ in 0..MAX_STEP_UPDATES {
@@ -124,7 +124,7 @@ impl<'a> Covariance<'a> {
     }
 
     /// Standard deviation of a linear combination of parameters, and its degrees of freedom.
-    fn deviation(&self, gradient: &[f64]) -> (f64, f64) {
+    pub(crate) fn deviation(&self, gradient: &[f64]) -> (f64, f64) {
         let variance = |f: &CholeskyFactor| f.forward_substitute(gradient).iter().map(|y| y * y).sum::<f64>();
         let all = variance(&self.factor);
         let mut weighted_squares = 0.0;

@@ -1,11 +1,13 @@
 //! Diagnosis of recordings: which effects the scenario lacks, with intervals, and the improvement on held-out
 //! recordings.
 
-use crate::base_law_fit::PreparedRecordings;
+use crate::base_law_fit::{PreparedRecordings, assumptions_of};
+use crate::check_json::{CheckItem, Light};
 use crate::claims::{self, Context, have_one_motion};
 use crate::competing_effects::{CompetingEffect, find_competing_effects};
 use crate::diagnosis_json::*;
 use crate::error::DiagnoseError;
+use crate::experiment_check::{check_before_fit, effects_item, parameters_item};
 use crate::fast_tone_cause::{fast_tone_cause, mark_mains, tone_mean_square_n2, without_removed_tones};
 use crate::fast_tones::remove_fast_tones;
 use crate::general_forms::mark_general_forms;
@@ -13,7 +15,7 @@ use crate::held_out::{
     FreeRunResidual, JackknifeResult, held_out_residuals, jackknife_effects, pooled_rms,
     pooled_rms_given_scatter, sample_noise_sd_n,
 };
-use crate::identifiability::{advice, not_identifiable};
+use crate::identifiability::{advice, not_identifiable, visible_effects};
 use crate::input_checks::{
     CleanRecordings, NamedRecording, check_recordings, clean_recordings, force_outlier_notes,
 };
@@ -21,6 +23,7 @@ use crate::measured_start::search_from_any_start;
 use crate::model_grade::grade;
 use crate::motion_period::common_motion_period_s;
 use crate::negligible_effects::{Negligible, negligible_effects};
+use crate::parameters_by_recording::parameters_by_recording;
 use crate::partial_model::partial_model;
 use crate::selection_state::{Search, SearchStage};
 use crate::sensor_artefact_causes::sensor_artefact_causes;
@@ -30,15 +33,16 @@ use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
 use stylet_identify::likelihood::FitData;
-use stylet_identify::model::Assumptions;
 use stylet_scenario::Scenario;
 use stylet_tissue::{AnyEffect, Effect};
 
 /// Options of a diagnosis.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Options {
-    /// Skips held-out errors and identifiability.
+    /// Skips the check of the recordings, held-out errors and identifiability.
     pub brief: bool,
+    /// Diagnoses recordings although their check says that it would mean nothing.
+    pub force: bool,
 }
 
 /// A diagnosis with the data for its report.
@@ -67,8 +71,24 @@ pub(crate) fn diagnose_given_layers(
     options: &Options,
     mut progress: impl FnMut(&str),
 ) -> Result<DiagnosisResult, DiagnoseError> {
-    let force_ratios = check_recordings(scenario, recordings)?;
+    let mut check = Vec::new();
+    let force_ratios = match check_recordings(scenario, recordings) {
+        Ok(ratios) => ratios,
+        Err(why) if options.force && why.is_implausible() => {
+            check.push(CheckItem::new("recordings", Light::Unusable, why.to_string()));
+            vec![None; recordings.len()]
+        }
+        Err(why) => return Err(why),
+    };
     let CleanRecordings { recordings: mut clean, mut notes, raw } = clean_recordings(recordings);
+    if !options.brief {
+        check.extend(check_before_fit(scenario, recordings, &clean, &notes));
+        let unusable: Vec<&str> =
+            check.iter().filter(|i| i.light == Light::Unusable).map(|i| i.message.as_str()).collect();
+        if !unusable.is_empty() && !options.force {
+            return Err(DiagnoseError::Unusable { reasons: unusable.join("; ") });
+        }
+    }
     for (notes, outlier) in notes.iter_mut().zip(force_outlier_notes(&force_ratios)) {
         notes.extend(outlier);
     }
@@ -182,8 +202,13 @@ pub(crate) fn diagnose_given_layers(
         Verdict::Named
     };
     causes.append(&mut artefacts);
-    let not_identifiable =
-        if options.brief { Vec::new() } else { not_identifiable(&search.best, &search.data) };
+    let (visible_effects, not_identifiable) = if options.brief {
+        (Vec::new(), Vec::new())
+    } else {
+        let visible = visible_effects(&search.best, &search.data);
+        let hidden = not_identifiable(&search.best, &search.data, &visible);
+        (visible, hidden)
+    };
     let with_tones = |error_n: f64| error_n.hypot(named_tones_n);
     let gain = Gain {
         held_out: recordings.len() > 1,
@@ -203,14 +228,25 @@ pub(crate) fn diagnose_given_layers(
             .extend(notes.into_iter().map(|note| DataQualityNote { recording: r.name.clone(), note }));
     }
     let (parameters, covariance) = labels_of_causes(assessment.labels, &causes);
+    if !options.brief {
+        check.extend([parameters_item(&parameters), effects_item(&visible_effects)]);
+    }
     let mut diagnosis = Diagnosis {
         verdict,
         agrees: false,
         grade: None,
         findings: Vec::new(),
+        check,
+        visible_effects,
         partial,
         advice: advice(&causes, &not_identifiable, common_motion_period_s(&search.data)),
         base_parameters: assessment.base_parameters,
+        by_recording: if options.brief {
+            Vec::new()
+        } else {
+            progress("fitting each recording alone");
+            parameters_by_recording(&search.best, &search.data, &parameters)
+        },
         parameters,
         covariance,
         not_identifiable,
@@ -254,19 +290,6 @@ fn labels_of_causes(
     let chosen = |row: Vec<f64>| row.into_iter().zip(&kept).filter(|(_, k)| **k).map(|(x, _)| x).collect();
     let rows = covariance.into_iter().zip(&kept).filter(|(_, k)| **k).map(|(row, _)| chosen(row));
     (labels.into_iter().filter(is_kept).collect(), rows.collect())
-}
-
-/// Prior of a scenario: its tissue, effects and tolerances.
-#[must_use]
-pub fn assumptions_of(s: &Scenario) -> Assumptions {
-    let layers = s.tissue.layers.len();
-    Assumptions {
-        tissue: s.tissue.clone(),
-        known_effects: s.effects.clone(),
-        tolerance: vec![s.tolerance; layers],
-        thickness_tolerance: vec![s.thickness_tolerance; layers],
-        surface_tolerance_m: s.surface_tolerance_m,
-    }
 }
 
 fn errors_per_recording(

@@ -1,5 +1,6 @@
 //! Result of a diagnosis, serialised as `diagnosis.json` (docs/reference/files.md, section "diagnosis.json").
 
+use crate::check_json::{CheckItem, EffectVisibility};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use stylet_record::QualityNote;
@@ -168,6 +169,17 @@ impl std::fmt::Display for LabelledParameter {
     }
 }
 
+/// A parameter fitted to each recording alone.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ParameterByRecording {
+    /// Its name.
+    pub parameter: String,
+    /// Value and 95 % interval of each recording, in the order of `gain.recordings`; `None` where the recording does not determine it.
+    pub estimates: Vec<Option<Estimate>>,
+    /// p-value of differences as large as these when the recordings have one value (Cochran's Q).
+    pub p_value: f64,
+}
+
 /// Grade of a model, or of one part of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Letter {
@@ -325,6 +337,8 @@ pub struct PartialModel {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FindingKind {
+    /// The check of the recordings says that a diagnosis means nothing; it was forced.
+    Unusable,
     /// The model predicts the recordings worse than noise and scatter between them explain.
     PredictionError,
     /// The residual depends on a feature.
@@ -364,12 +378,18 @@ pub struct Diagnosis {
     /// Whether the simulation agrees with the data: no effect is missing, and no finding contradicts.
     #[serde(default)]
     pub agrees: bool,
-    /// Grade of the extended model; `None` for data sets of repeats and specimens.
+    /// Grade of the extended model; `None` for data sets of specimens.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grade: Option<Grade>,
     /// Findings that contradict agreement, or that limit the confidence.
     #[serde(default)]
     pub findings: Vec<Finding>,
+    /// What the recordings allow, found before the search: `items` of `check.json`.
+    #[serde(default)]
+    pub check: Vec<CheckItem>,
+    /// From which size on each effect of the library would be seen in these recordings.
+    #[serde(default)]
+    pub visible_effects: Vec<EffectVisibility>,
     /// The best model beside an unmodelled force, kept in `extended.ron`; only with the verdict `unknown`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partial: Option<PartialModel>,
@@ -383,6 +403,9 @@ pub struct Diagnosis {
     /// Covariance of these parameters, in their order and units.
     #[serde(default)]
     pub covariance: Vec<Vec<f64>>,
+    /// Parameters that the recordings determine, fitted to each recording alone.
+    #[serde(default)]
+    pub by_recording: Vec<ParameterByRecording>,
     /// Effects that are not identifiable from these recordings.
     pub not_identifiable: Vec<String>,
     /// Improvement of the prediction.

@@ -117,7 +117,30 @@ pub enum DiagnoseError {
         /// Scale that would correct it.
         scale: f64,
     },
+    /// The check of the recordings says that a diagnosis would mean nothing.
+    #[error(
+        "a diagnosis of these recordings would mean nothing: {reasons}; look at `stylet check`, or add --force"
+    )]
+    Unusable {
+        /// What stands against it.
+        reasons: String,
+    },
     /// The base law could not be fitted.
     #[error("the base law cannot be fitted to these recordings: a replay gives no finite force")]
     NoFit,
+}
+
+impl DiagnoseError {
+    /// Whether recordings can be diagnosed all the same, although their units, signs or reach are not those of the scenario.
+    #[must_use]
+    pub fn is_implausible(&self) -> bool {
+        matches!(
+            self,
+            Self::NeverReaches { .. }
+                | Self::BeginsBehind { .. }
+                | Self::PositionUnit { .. }
+                | Self::TimeUnit { .. }
+                | Self::Force { .. }
+        )
+    }
 }

@@ -1,27 +1,25 @@
 //! Before the fit: what recordings can show, and what they cannot.
 
-use crate::base_law_fit::{PreparedRecordings, fit_base_law};
+use crate::base_law_fit::{PreparedRecordings, assumptions_of, fit_base_law};
+use crate::check_json::{CheckItem, EffectVisibility, Light};
 use crate::claims::have_one_motion;
 use crate::confidence_intervals::Covariance;
-use crate::diagnose::assumptions_of;
 use crate::diagnosis_json::{BaseParameter, LabelledParameter, ParameterLabel};
 use crate::error::DiagnoseError;
-use crate::identifiability::{MIN_DETECTABLE_NATS, typical_size};
+use crate::identifiability::visible_effects;
 use crate::input_checks::{CleanRecordings, NamedRecording, check_recordings, clean_recordings};
 use crate::parameter_labels::label_parameters;
 use crate::verdict::base_parameters;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use stylet_core::{EnhanceConfig, Sample};
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
-use stylet_identify::score_test::{ScoreTest, scale_strengths};
-use stylet_record::Recording;
+use stylet_record::{QualityNote, Recording};
 use stylet_scenario::Scenario;
 use stylet_score::{ContactFinding, ContactHypothesis, Trace};
-use stylet_tissue::{EffectInfo, general_effects};
+use stylet_tissue::Tissue;
 
 /// Speeds inside the tissue that differ by less than this factor count as one.
 const ONE_SPEED_FACTOR: f64 = 1.2;
@@ -29,56 +27,8 @@ const ONE_SPEED_FACTOR: f64 = 1.2;
 const HOLD_SHARE: f64 = 0.05;
 /// A hold of this duration in s shows relaxation.
 const MIN_HOLD_S: f64 = 0.5;
-/// Largest multiple of an effect's typical size that is plausible.
-const MAX_PLAUSIBLE_FACTOR: f64 = 30.0;
 /// Seed of the bootstrap: equal recordings give equal results.
 const BOOTSTRAP_SEED: u64 = 1;
-
-/// How far recordings serve.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Light {
-    /// Nothing stands against a diagnosis.
-    Good,
-    /// A diagnosis will be limited.
-    Limited,
-    /// A diagnosis would mean nothing.
-    Unusable,
-}
-
-impl Light {
-    /// As the command and its report print it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Light::Good => "good",
-            Light::Limited => "limited",
-            Light::Unusable => "unusable",
-        }
-    }
-}
-
-/// One aspect of an experiment.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct CheckItem {
-    /// What was checked: `recordings`, `contact`, `motion`, `depth`, `parameters` or `effects`.
-    pub topic: String,
-    /// How far the recordings serve.
-    pub light: Light,
-    /// The reason, in one sentence.
-    pub message: String,
-}
-
-/// From which size on an effect would be seen.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct EffectVisibility {
-    /// Effect id.
-    pub effect: String,
-    /// Whether its typical size would be seen.
-    pub visible: bool,
-    /// Parameters at the smallest size that would be seen; `None` when no plausible size would.
-    pub smallest: Option<BTreeMap<String, f64>>,
-}
 
 /// What recordings can show: `check.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -99,10 +49,6 @@ impl ExperimentCheck {
     pub fn is_usable(&self) -> bool {
         self.items.iter().all(|item| item.light != Light::Unusable)
     }
-
-    fn add(&mut self, topic: &str, light: Light, message: String) {
-        self.items.push(CheckItem { topic: topic.to_owned(), light, message });
-    }
 }
 
 /// Checks what recordings can show about a scenario, before any effect is searched. What makes a diagnosis meaningless is an item of the
@@ -116,28 +62,11 @@ pub fn check_experiment(
 ) -> Result<ExperimentCheck, DiagnoseError> {
     let mut out = ExperimentCheck::default();
     if let Err(why) = check_recordings(scenario, recordings) {
-        out.add("recordings", Light::Unusable, why.to_string());
+        out.items.push(CheckItem::new("recordings", Light::Unusable, why.to_string()));
         return Ok(out);
     }
     let CleanRecordings { recordings: clean, notes, raw } = clean_recordings(recordings);
-    for (r, note) in recordings.iter().zip(&notes).flat_map(|(r, notes)| notes.iter().map(move |n| (r, n))) {
-        let light = if note.blocking { Light::Unusable } else { Light::Limited };
-        out.add("recordings", light, format!("{}: {}", r.name, note.message));
-    }
-    if out.items.is_empty() {
-        let what = if clean.len() == 1 { "one recording" } else { "recordings" };
-        let hz = stylet_stats::median_of(clean.iter().map(Recording::sample_hz));
-        out.add("recordings", Light::Good, format!("{what} without gaps or spikes, {hz:.0} Hz"));
-    }
-    if clean.len() == 1 {
-        out.add(
-            "recordings",
-            Light::Limited,
-            "one recording: no prediction can be tested on another; record at least two".to_owned(),
-        );
-    }
-    check_contact(&mut out, recordings, &clean);
-    check_motion(&mut out, scenario, &clean);
+    out.items = check_before_fit(scenario, recordings, &clean, &notes);
     let blocks: Vec<BlockAverages> =
         clean.par_iter().zip(&raw.exclude).map(|(r, x)| BlockAverages::new(r, x, BLOCK_S)).collect();
     let min_noise_n = raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD;
@@ -146,16 +75,42 @@ pub fn check_experiment(
     let covariance = Covariance::new(&fit, &data, &mut ChaCha8Rng::seed_from_u64(BOOTSTRAP_SEED));
     out.base_parameters = base_parameters(&covariance);
     out.parameters = label_parameters(&covariance, &data, &out.base_parameters, &[]).0;
-    check_parameters(&mut out);
-    let score_test = ScoreTest::new(&fit, &data);
-    let effects: Vec<&'static EffectInfo> = general_effects().collect();
-    out.effects = effects.par_iter().filter_map(|info| visibility(info, &score_test)).collect();
-    check_effects(&mut out);
+    out.effects = visible_effects(&fit, &data);
+    out.items.push(parameters_item(&out.parameters));
+    out.items.push(effects_item(&out.effects));
     Ok(out)
 }
 
+/// What recordings allow, as far as it is known before a fit: data quality, contact, motion and depth. `clean` and `notes` are the
+/// recordings without samples that are not finite, and the notes on their quality.
+pub(crate) fn check_before_fit(
+    scenario: &Scenario,
+    recordings: &[NamedRecording],
+    clean: &[Recording],
+    notes: &[Vec<QualityNote>],
+) -> Vec<CheckItem> {
+    let mut items = Vec::new();
+    for (r, note) in recordings.iter().zip(notes).flat_map(|(r, notes)| notes.iter().map(move |n| (r, n))) {
+        let light = if note.blocking { Light::Unusable } else { Light::Limited };
+        items.push(CheckItem::new("recordings", light, format!("{}: {}", r.name, note.message)));
+    }
+    if items.is_empty() {
+        let what = if clean.len() == 1 { "one recording" } else { "recordings" };
+        let hz = stylet_stats::median_of(clean.iter().map(Recording::sample_hz));
+        let message = format!("{what} without gaps or spikes, {hz:.0} Hz");
+        items.push(CheckItem::new("recordings", Light::Good, message));
+    }
+    if clean.len() == 1 {
+        let message = "one recording: no prediction can be tested on another; record at least two";
+        items.push(CheckItem::new("recordings", Light::Limited, message.to_owned()));
+    }
+    items.extend(check_contact(recordings, clean));
+    items.extend(check_motion(&scenario.tissue, clean));
+    items
+}
+
 /// How each recording begins, by the online algorithm.
-fn check_contact(out: &mut ExperimentCheck, recordings: &[NamedRecording], clean: &[Recording]) {
+fn check_contact(recordings: &[NamedRecording], clean: &[Recording]) -> Vec<CheckItem> {
     let config = EnhanceConfig::default();
     let find = |r: &Recording| {
         Trace::run_measured(r, &r.force_n, &config, 0.0, None::<fn(&Sample, usize) -> f64>).contact
@@ -165,19 +120,20 @@ fn check_contact(out: &mut ExperimentCheck, recordings: &[NamedRecording], clean
         matches!(c.hypothesis, ContactHypothesis::NeverTouches | ContactHypothesis::AtRest)
     };
     let all_without = found.iter().all(is_none);
-    for (r, contact) in recordings.iter().zip(&found) {
+    let item = |(r, contact): (&NamedRecording, &ContactFinding)| {
         let light = match contact.hypothesis {
             _ if is_none(contact) && all_without => Light::Unusable,
             ContactHypothesis::ConstantOffset => Light::Good,
             _ => Light::Limited,
         };
-        out.add("contact", light, format!("{}: {}", r.name, contact.sentence()));
-    }
+        CheckItem::new("contact", light, format!("{}: {}", r.name, contact.sentence()))
+    };
+    recordings.iter().zip(&found).map(item).collect()
 }
 
 /// What the motion excites: speeds, holds, retraction, and depth.
-fn check_motion(out: &mut ExperimentCheck, scenario: &Scenario, recordings: &[Recording]) {
-    let tissue = &scenario.tissue;
+fn check_motion(tissue: &Tissue, recordings: &[Recording]) -> Vec<CheckItem> {
+    let mut items = Vec::new();
     let (mut slowest, mut fastest) = (f64::INFINITY, 0.0_f64);
     let (mut hold_s, mut is_retracted, mut deepest_m) = (0.0_f64, false, f64::NEG_INFINITY);
     let peak_mps = recordings.iter().flat_map(|r| &r.velocity_mps).fold(0.0, |m: f64, v| m.max(v.abs()));
@@ -199,23 +155,17 @@ fn check_motion(out: &mut ExperimentCheck, scenario: &Scenario, recordings: &[Re
         }
     }
     let mm = |mps: f64| format!("{:.3} mm/s", 1e3 * mps);
-    if fastest > ONE_SPEED_FACTOR * slowest {
-        out.add(
-            "motion",
-            Light::Good,
-            format!("speeds from {} to {} in the tissue", mm(slowest), mm(fastest)),
-        );
+    items.push(if fastest > ONE_SPEED_FACTOR * slowest {
+        let message = format!("speeds from {} to {} in the tissue", mm(slowest), mm(fastest));
+        CheckItem::new("motion", Light::Good, message)
     } else {
-        out.add(
-            "motion",
-            Light::Limited,
-            format!(
-                "one constant speed of {} in the tissue: most friction laws look the same, and the stiffness of a layer separates from its friction \
-                 only where it ruptures; vary the speed within each layer",
-                mm(fastest)
-            ),
+        let message = format!(
+            "one constant speed of {} in the tissue: most friction laws look the same, and the stiffness of a layer separates from its \
+             friction only where it ruptures; vary the speed within each layer",
+            mm(fastest)
         );
-    }
+        CheckItem::new("motion", Light::Limited, message)
+    });
     let missing: Vec<&str> = [
         (hold_s < MIN_HOLD_S, "no hold inside the tissue, which would show relaxation"),
         (!is_retracted, "no retraction, which would show friction alone"),
@@ -228,61 +178,47 @@ fn check_motion(out: &mut ExperimentCheck, scenario: &Scenario, recordings: &[Re
     .filter_map(|(is_missing, what)| is_missing.then_some(what))
     .collect();
     if !missing.is_empty() {
-        out.add("motion", Light::Limited, missing.join("; "));
+        items.push(CheckItem::new("motion", Light::Limited, missing.join("; ")));
     }
     let unreached = (0..tissue.layers.len()).filter(|k| tissue.front_m(*k) >= deepest_m).count();
     if unreached > 0 {
-        out.add(
-            "depth",
-            Light::Limited,
-            format!(
-                "the needle reaches {:.1} mm and not the last {unreached} of {} layers: their numbers stay as assumed",
-                1e3 * deepest_m,
-                tissue.layers.len()
-            ),
+        let message = format!(
+            "the needle reaches {:.1} mm and not the last {unreached} of {} layers: their numbers stay as assumed",
+            1e3 * deepest_m,
+            tissue.layers.len()
         );
+        items.push(CheckItem::new("depth", Light::Limited, message));
     }
+    items
 }
 
-fn check_parameters(out: &mut ExperimentCheck) {
-    let open: Vec<String> = out
-        .parameters
-        .iter()
+/// How many parameters of the layers these recordings determine.
+pub(crate) fn parameters_item(parameters: &[LabelledParameter]) -> CheckItem {
+    let of_layers = || parameters.iter().filter(|p| p.effect.is_none());
+    let open: Vec<String> = of_layers()
         .filter(|p| p.label != ParameterLabel::Determined)
         .map(|p| format!("{p} ({})", p.label_in_words()))
         .collect();
-    let total = out.parameters.len();
+    let total = of_layers().count();
     if open.is_empty() {
-        out.add("parameters", Light::Good, format!("all {total} parameters of the layers are determined"));
-    } else {
-        let count = total - open.len();
-        let message = format!("{count} of {total} parameters are determined; not: {}", open.join(", "));
-        out.add("parameters", Light::Limited, message);
+        let message = format!("all {total} parameters of the layers are determined");
+        return CheckItem::new("parameters", Light::Good, message);
     }
+    let message =
+        format!("{} of {total} parameters are determined; not: {}", total - open.len(), open.join(", "));
+    CheckItem::new("parameters", Light::Limited, message)
 }
 
-fn check_effects(out: &mut ExperimentCheck) {
-    let hidden: Vec<&str> = out.effects.iter().filter(|e| !e.visible).map(|e| e.effect.as_str()).collect();
-    let total = out.effects.len();
+/// How many effects would be seen at their typical size.
+pub(crate) fn effects_item(effects: &[EffectVisibility]) -> CheckItem {
+    let hidden: Vec<&str> = effects.iter().filter(|e| !e.visible).map(|e| e.effect.as_str()).collect();
+    let total = effects.len();
     if hidden.is_empty() {
-        out.add("effects", Light::Good, format!("all {total} effects would be seen at their typical size"));
-    } else {
-        let message = format!(
-            "{} of {total} effects would be seen at their typical size; not: {}",
-            total - hidden.len(),
-            hidden.join(", ")
-        );
-        out.add("effects", Light::Limited, message);
+        let message = format!("all {total} effects would be seen at their typical size");
+        return CheckItem::new("effects", Light::Good, message);
     }
-}
-
-/// Visibility of an effect; `None` for those that have no column to test.
-fn visibility(info: &'static EffectInfo, score_test: &ScoreTest) -> Option<EffectVisibility> {
-    let (values, nats) = typical_size(info, score_test)?;
-    let factor = (MIN_DETECTABLE_NATS / nats.max(1e-12)).sqrt();
-    let smallest = (factor <= MAX_PLAUSIBLE_FACTOR).then(|| {
-        let scaled = scale_strengths(info, &[&values], &[factor]);
-        info.parameters.iter().map(|p| p.path.to_owned()).zip(scaled).collect()
-    });
-    Some(EffectVisibility { effect: info.id.to_owned(), visible: nats >= MIN_DETECTABLE_NATS, smallest })
+    let seen = total - hidden.len();
+    let message =
+        format!("{seen} of {total} effects would be seen at their typical size; not: {}", hidden.join(", "));
+    CheckItem::new("effects", Light::Limited, message)
 }

@@ -1,39 +1,58 @@
 //! Identifiability: effects whose signature is absorbed by the fitted parameters, and motions that would reveal them.
 
+use crate::check_json::EffectVisibility;
 use crate::diagnosis_json::Cause;
 use crate::motion_period::common_motion_period_s;
 use rayon::prelude::*;
 use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::EffectTerm;
-use stylet_identify::score_test::ScoreTest;
+use stylet_identify::score_test::{ScoreTest, scale_strengths};
 use stylet_tissue::{ChainStage, EffectInfo, FitScale, Proposal, general_effects};
 
 /// An effect of typical size that would gain less than this many nats is not identifiable.
-pub(crate) const MIN_DETECTABLE_NATS: f64 = 10.0;
+const MIN_DETECTABLE_NATS: f64 = 10.0;
 
-/// Effects that are not identifiable from these recordings, in the order of the library.
+/// Largest multiple of an effect's typical size that is plausible.
+const MAX_PLAUSIBLE_FACTOR: f64 = 30.0;
+
+/// From which size on each effect that a fit does not contain would be seen beside it; without the effects that have no column to test.
 #[must_use]
-pub fn not_identifiable(best: &Fit, data: &FitData) -> Vec<String> {
-    let score_test = ScoreTest::new(best, data);
-    let entries: Vec<&'static EffectInfo> =
-        general_effects().filter(|i| best.model.effects.iter().all(|e| e.info.id != i.id)).collect();
-    let identifiable: Vec<bool> = entries.par_iter().map(|info| is_identifiable(info, &score_test)).collect();
-    entries.iter().zip(identifiable).filter(|(_, s)| !s).map(|(i, _)| i.id.to_owned()).collect()
+pub fn visible_effects(fit: &Fit, data: &FitData) -> Vec<EffectVisibility> {
+    let score_test = ScoreTest::new(fit, data);
+    let missing: Vec<&'static EffectInfo> = missing_effects(fit).collect();
+    missing.par_iter().filter_map(|info| visibility(info, &score_test)).collect()
 }
 
-fn is_identifiable(info: &'static EffectInfo, score_test: &ScoreTest) -> bool {
-    match typical_size(info, score_test) {
-        Some((_, nats)) => nats >= MIN_DETECTABLE_NATS,
+fn missing_effects(fit: &Fit) -> impl Iterator<Item = &'static EffectInfo> + '_ {
+    general_effects().filter(|i| fit.model.effects.iter().all(|e| e.info.id != i.id))
+}
+
+fn visibility(info: &'static EffectInfo, score_test: &ScoreTest) -> Option<EffectVisibility> {
+    let (values, nats) = typical_size(info, score_test)?;
+    let factor = (MIN_DETECTABLE_NATS / nats.max(1e-12)).sqrt();
+    let smallest = (factor <= MAX_PLAUSIBLE_FACTOR).then(|| {
+        let scaled = scale_strengths(info, &[&values], &[factor]);
+        info.parameters.iter().map(|p| p.path.to_owned()).zip(scaled).collect()
+    });
+    Some(EffectVisibility { effect: info.id.to_owned(), visible: nats >= MIN_DETECTABLE_NATS, smallest })
+}
+
+/// Effects that are not identifiable from these recordings, in the order of the library; `visible` are those with a column to test.
+#[must_use]
+pub fn not_identifiable(best: &Fit, data: &FitData, visible: &[EffectVisibility]) -> Vec<String> {
+    let is_identifiable = |info: &EffectInfo| match visible.iter().find(|v| v.effect == info.id) {
+        Some(v) => v.visible,
         // Free thicknesses absorb a shifted layer boundary.
-        None if matches!(info.proposal, Proposal::LayerFaces(_)) => !score_test.fit.model.free.thickness,
-        None => !has_clock(info) || common_motion_period_s(score_test.data).is_none(),
-    }
+        None if matches!(info.proposal, Proposal::LayerFaces(_)) => !best.model.free.thickness,
+        None => !has_clock(info) || common_motion_period_s(data).is_none(),
+    };
+    missing_effects(best).filter(|info| !is_identifiable(info)).map(|i| i.id.to_owned()).collect()
 }
 
 /// Parameters of an effect at its typical size, and the nats that it would gain; the largest over its shapes. `None` for an effect
 /// without a column to test.
-pub(crate) fn typical_size(info: &'static EffectInfo, score_test: &ScoreTest) -> Option<(Vec<f64>, f64)> {
+fn typical_size(info: &'static EffectInfo, score_test: &ScoreTest) -> Option<(Vec<f64>, f64)> {
     let start = || info.parameters.iter().map(|p| p.start).collect::<Vec<f64>>();
     let typical = |group: &[&[f64]]| -> Vec<f64> {
         info.parameters

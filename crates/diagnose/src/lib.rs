@@ -24,6 +24,7 @@
 pub mod base_law_fit;
 mod baseline_search;
 mod bootstrap_noise;
+pub mod check_json;
 pub mod claims;
 pub mod competing_effects;
 pub mod confidence_intervals;
@@ -55,6 +56,7 @@ mod motion_period;
 pub mod negligible_effects;
 mod outlier_segment_test;
 mod parameter_labels;
+mod parameters_by_recording;
 mod partial_model;
 pub mod prediction;
 pub mod random_effect_selection;
@@ -73,8 +75,9 @@ pub mod varying_coefficient_test;
 mod verdict;
 mod zero_steps;
 
+pub use base_law_fit::assumptions_of;
 pub use competing_effects::EQUIVALENCE_NATS;
-pub use diagnose::{DiagnosisResult, Options, REASON_IMITATES_UNMODELLED, assumptions_of};
+pub use diagnose::{DiagnosisResult, Options, REASON_IMITATES_UNMODELLED};
 pub use diagnosis_json::{Diagnosis, Verdict};
 pub use error::DiagnoseError;
 pub use input_checks::NamedRecording;

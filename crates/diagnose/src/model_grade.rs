@@ -2,7 +2,7 @@
 //!
 //! | part | A | B | C | D |
 //! |---|---|---|---|---|
-//! | error of predictions over the noise, scatter between recordings known | at most 1.25 | 2 | 4 | more |
+//! | error of predictions over the noise (scatter between recordings known) or the repeatability | at most 1.25 | 2 | 4 | more |
 //! | residual | noise | | depends on a feature | unknown effect |
 //! | parameters that the recordings determine | at least 2/3 | 1/2 | 1/4 | fewer |
 //! | causes | separated | equivalent ones | one at a bound | |
@@ -27,10 +27,12 @@ pub fn grade(d: &Diagnosis, resolution_n: f64) -> Grade {
     let g = &d.gain;
     let ratio = g.rmse_given_scatter_n / g.floor_n.max(resolution_n).max(f64::MIN_POSITIVE);
     let what = if g.held_out { "held-out recordings are predicted" } else { "the recording is fitted" };
+    // The floor of repeats is how well they predict one another.
+    let floor = if g.floor_n > d.noise.sd_n { "repeatability" } else { "noise" };
     add(
         "error",
         of_rank(rank(ratio, MAX_ERROR)),
-        format!("{what} to {} times the noise", significant(ratio, 2)),
+        format!("{what} to {} times the {floor}", significant(ratio, 2)),
     );
     let depends = d.residual_structure.depends_on.join(", ");
     match (d.verdict, d.residual_structure.p_value < SIGNIFICANT_P_VALUE) {

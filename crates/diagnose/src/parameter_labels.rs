@@ -8,7 +8,7 @@ use crate::confidence_intervals::{Covariance, interval_end_nats};
 use crate::diagnosis_json::{BaseParameter, Cause, LabelledParameter, ParameterLabel};
 use stylet_identify::fit::apply_step;
 use stylet_identify::likelihood::{FitData, residuals};
-use stylet_identify::model::{Parameter, ParameterRole};
+use stylet_identify::model::{Model, Parameter, ParameterRole};
 use stylet_stats::Z95;
 
 /// The data close an interval where they lose at least this share of an interval end's loss: the prior provides the rest.
@@ -73,18 +73,23 @@ pub(crate) fn label_parameters(
     (labelled.collect(), matrix)
 }
 
+/// Role of a parameter of the base law in the fit, and the factor from the scale of the fit to its unit.
+pub(crate) fn base_role(model: &Model, layer: usize, name: &str) -> Option<(ParameterRole, f64)> {
+    let layer = layer.wrapping_sub(1);
+    let assumed = model.assumed.tissue.layers.get(layer);
+    Some(match name {
+        "stiffness_n_per_m" => (ParameterRole::Stiffness(layer), assumed?.stiffness_n_per_m),
+        "friction_ns_per_m2" => (ParameterRole::Friction(layer), assumed?.friction_ns_per_m2),
+        "puncture_n" => (ParameterRole::Puncture(layer), assumed?.puncture_n?),
+        "thickness_m" => (ParameterRole::Thickness(layer), 1.0),
+        _ => (ParameterRole::Surface, 1.0),
+    })
+}
+
 fn base_entries(covariance: &Covariance, base: &[BaseParameter]) -> Vec<Entry> {
     let tissue = &covariance.fit.model.tissue;
     let entry = |b: &BaseParameter| {
-        let layer = b.layer.wrapping_sub(1);
-        let assumed = covariance.fit.model.assumed.tissue.layers.get(layer);
-        let (role, scale) = match b.name.as_str() {
-            "stiffness_n_per_m" => (ParameterRole::Stiffness(layer), assumed?.stiffness_n_per_m),
-            "friction_ns_per_m2" => (ParameterRole::Friction(layer), assumed?.friction_ns_per_m2),
-            "puncture_n" => (ParameterRole::Puncture(layer), assumed?.puncture_n?),
-            "thickness_m" => (ParameterRole::Thickness(layer), 1.0),
-            _ => (ParameterRole::Surface, 1.0),
-        };
+        let (role, scale) = base_role(&covariance.fit.model, b.layer, &b.name)?;
         let mut gradient = vec![0.0; covariance.factor.size()];
         gradient[covariance.index_of(role)?] = scale;
         let label = match (b.at_least, b.at_bound) {

@@ -557,9 +557,13 @@ fn combined_effects_are_identified() {
 #[test]
 fn predictions_are_reproduced() {
     let effect: AnyEffect = CoulombFriction { c_n_per_m: 12.0 }.into();
-    let found =
-        diagnose(&two_layers(), &Case::with([effect.clone()]).recordings(), &Options { brief: true }, |_| {})
-            .expect("a diagnosis");
+    let found = diagnose(
+        &two_layers(),
+        &Case::with([effect.clone()]).recordings(),
+        &Options { brief: true, ..Options::default() },
+        |_| {},
+    )
+    .expect("a diagnosis");
     let mut case = Case { scatter: 0.05, seed: 23, ..Case::with([effect.clone()]) };
     case.truth.surface_m = 6e-4;
     case.truth.layers.iter_mut().for_each(|l| l.friction_ns_per_m2 *= 0.85);

@@ -45,7 +45,9 @@ fn insertion(seed: u64, added_n: impl Fn(f64, f64) -> f64) -> NamedRecording {
 
 fn diagnosed(data: &[NamedRecording]) -> Diagnosis {
     let scenario = Scenario::parse("assumed.ron", ASSUMED).expect("a scenario");
-    diagnose(&scenario, data, &Options { brief: true }, |_| {}).expect("a diagnosis").diagnosis
+    diagnose(&scenario, data, &Options { brief: true, ..Options::default() }, |_| {})
+        .expect("a diagnosis")
+        .diagnosis
 }
 
 fn names(d: &Diagnosis) -> Vec<&str> {

@@ -169,7 +169,8 @@ impl SimulationCheck<'_> {
             recordings.push(self.simulate(candidate, &self.assumed.motion, seed + 7)?);
         }
         recordings.push(self.simulate(candidate, motion, seed)?);
-        let result = diagnose(self.assumed, &recordings, &Options { brief: true }, |_| {})?;
+        let result =
+            diagnose(self.assumed, &recordings, &Options { brief: true, ..Options::default() }, |_| {})?;
         Ok((is_correct(&result.diagnosis, self.information, candidate), result.search.data.blocks_replayed()))
     }
 

@@ -69,7 +69,9 @@ fn the_planned_insertion_leads_to_the_correct_single_effect() {
     assert!(planned.probability_decided > planned.probability_now + 0.3);
     // The recordings have different motions.
     let both = [first, measured(&planned.motion, 2)];
-    let actual = diagnose(&scenario, &both, &Options { brief: true }, |_| {}).expect("a diagnosis").diagnosis;
+    let actual = diagnose(&scenario, &both, &Options { brief: true, ..Options::default() }, |_| {})
+        .expect("a diagnosis")
+        .diagnosis;
     assert_eq!(actual.verdict, Verdict::Named, "{:?}", actual.causes);
     assert_eq!(actual.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>(), ["coulomb_friction"]);
 }

@@ -36,7 +36,8 @@ struct Parts {
 
 /// Compares an assumed scenario with measured recordings.
 #[pyfunction]
-#[pyo3(signature = (kind, source, measured, columns=None, repair=false, progress=None))]
+#[pyo3(signature = (kind, source, measured, columns=None, repair=false, force=false, progress=None))]
+#[allow(clippy::too_many_arguments, reason = "arguments by name")]
 pub fn diagnose(
     py: Python<'_>,
     kind: &str,
@@ -44,16 +45,18 @@ pub fn diagnose(
     measured: Vec<Measured<'_>>,
     columns: Option<PathBuf>,
     repair: bool,
+    force: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Diagnosis> {
     let scenario = parse(kind, source)?;
     let recordings = to_recordings(&measured, columns, repair)?;
+    let options = stylet::DiagnoseOptions { force, ..stylet::DiagnoseOptions::default() };
     let assumed = if kind == "path" { source.to_owned() } else { scenario.name.clone() };
     let named = assumed.clone();
     let found = run_in_background(py, progress, move |callback| {
         let mut done = 0;
         let found: Result<DiagnosisReport, stylet::Error> =
-            stylet::diagnose(&scenario, &recordings, |what| {
+            stylet::diagnose(&scenario, &recordings, &options, |what| {
                 done += 1;
                 callback.report_or_stop(what, done);
             });

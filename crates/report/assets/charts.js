@@ -134,7 +134,7 @@ function options(view) {
         splits: distr === 4 ? u => asinhSplits(u, spec.linearBelow) : undefined, filter: distr === 4 ? (u, splits) => splits : undefined })],
     hooks: {
       drawClear: [u => { if (spec.bands.length) { u.ctx.save(); clipToPlot(u); drawBands(view); u.ctx.restore(); } }],
-      draw: [() => drawAll(view)],
+      draw: [() => { drawAll(view); drawPlayhead(view); }],
       setScale: [(u, key) => onScale(view, key)],
       setCursor: [() => showValues(view)],
     },
@@ -179,6 +179,7 @@ for (const view of views) {
   buildLegend(view);
   view.u = new uPlot(options(view), [view.group.extent.slice()], view.plot);
   bindEvents(view);
+  buildNeedle(view, views.indexOf(view));
 }
 for (const group of groups.values()) reset(group);
 for (const button of document.querySelectorAll("button[data-reset]")) {

@@ -100,11 +100,18 @@ fn chart_json(chart: &Chart, columns: &mut Columns) -> Value {
         Scale::Log => ("log", None),
         Scale::Asinh(threshold) => ("asinh", Some(threshold)),
     };
+    let needle = chart.needle.as_ref().map(|needle| {
+        json!({
+            "time": columns.intern(&needle.time_s, X_DIGITS),
+            "tip": columns.intern(&needle.tip_mm, Y_DIGITS),
+            "faces": needle.faces_mm,
+        })
+    });
     json!({
         "title": chart.title, "x": chart.x_label, "y": chart.y_label, "group": chart.group,
         "height": chart.height_px, "scale": scale, "linearBelow": linear_below, "yRange": chart.y_range,
         "parametric": chart.parametric, "series": series, "markers": markers, "bands": bands,
-        "levels": levels, "lanes": lanes,
+        "levels": levels, "lanes": lanes, "needle": needle,
     })
 }
 

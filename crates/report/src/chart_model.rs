@@ -180,6 +180,17 @@ pub struct Span {
     pub colour: Colour,
 }
 
+/// A needle that moves through layers beside a chart over time, while the reader plays or drags the time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Needle {
+    /// Time in s, increasing, as the chart's abscissa.
+    pub time_s: Vec<f64>,
+    /// Position of the tip in mm at these times, positive into the tissue.
+    pub tip_mm: Vec<f64>,
+    /// Faces of the layers in mm: the surface, then the end of each layer.
+    pub faces_mm: Vec<f64>,
+}
+
 /// One chart. Charts with the same `group` share zoom, pan and cursor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chart {
@@ -211,6 +222,8 @@ pub struct Chart {
     pub levels: Vec<Level>,
     /// Rows of spans; a chart with lanes shows no curves.
     pub lanes: Vec<Lane>,
+    /// A needle that moves with the time of the curves.
+    pub needle: Option<Needle>,
 }
 
 impl Chart {
@@ -232,6 +245,7 @@ impl Chart {
             bands: Vec::new(),
             levels: Vec::new(),
             lanes: Vec::new(),
+            needle: None,
         }
     }
 
@@ -262,6 +276,13 @@ impl Chart {
     #[must_use]
     pub fn with_level(mut self, level: Level) -> Self {
         self.levels.push(level);
+        self
+    }
+
+    /// Adds a needle that moves with the time of the curves.
+    #[must_use]
+    pub fn with_needle(mut self, needle: Needle) -> Self {
+        self.needle = Some(needle);
         self
     }
 

@@ -9,9 +9,10 @@ use std::fmt::Write;
 
 const PAGE_CSS: &str = include_str!("../assets/page.css");
 /// In load order: each may use the ones before.
-const PAGE_JS: [&str; 4] = [
+const PAGE_JS: [&str; 5] = [
     include_str!("../assets/drawing.js"),
     include_str!("../assets/legend.js"),
+    include_str!("../assets/needle.js"),
     include_str!("../assets/charts.js"),
     include_str!("../assets/selftest.js"),
 ];
@@ -165,14 +166,23 @@ fn render_chart(out: &mut String, chart: &Chart, number: usize) {
     if !chart.caption.is_empty() {
         let _ = writeln!(out, "<p>{}</p>", escape_html(&chart.caption));
     }
-    let _ = writeln!(
-        out,
-        "</figcaption>\n<div class=\"legend\" id=\"legend-{number}\"></div>\n\
-         <div class=\"plot\" id=\"plot-{number}\" style=\"min-height:{}px\" role=\"img\" tabindex=\"0\" aria-label=\"{}\">\
-         <noscript>This chart needs JavaScript.</noscript></div>\n</figure>",
+    let _ = writeln!(out, "</figcaption>\n<div class=\"legend\" id=\"legend-{number}\"></div>");
+    let plot = format!(
+        "<div class=\"plot\" id=\"plot-{number}\" style=\"min-height:{}px\" role=\"img\" tabindex=\"0\" aria-label=\"{}\">\
+         <noscript>This chart needs JavaScript.</noscript></div>",
         chart.height_px,
         escape_html(&description)
     );
+    let _ = if chart.needle.is_some() {
+        writeln!(
+            out,
+            "<div class=\"insertion\"><canvas id=\"needle-{number}\" role=\"img\" aria-label=\"Needle in the layers\"></canvas>{plot}</div>\n\
+             <div class=\"player\" id=\"player-{number}\"><button type=\"button\">Play</button>\
+             <input type=\"range\" min=\"0\" max=\"1000\" value=\"1000\" aria-label=\"Time of the insertion\"><output></output></div>\n</figure>"
+        )
+    } else {
+        writeln!(out, "{plot}\n</figure>")
+    };
 }
 
 fn render_scorecard(out: &mut String, tiles: &[Tile]) {

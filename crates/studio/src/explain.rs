@@ -10,7 +10,7 @@ use crate::workspace::{LIMITS, PHANTOM};
 use serde_json::{Value, json};
 use stylet_api::plan_insertion::{self, PlanReport};
 use stylet_api::prediction_files::{self, ModelOrigin};
-use stylet_api::{DiagnosisInputs, Limits, Scenario, force_along_motion};
+use stylet_api::{DiagnoseOptions, DiagnosisInputs, Limits, Scenario, force_along_motion};
 use stylet_report::pages::formatting::significant_or_dash;
 use stylet_report::pages::prediction;
 use stylet_report::{percent, significant};
@@ -67,7 +67,7 @@ pub fn start_diagnosis(studio: &mut Studio, request: FilesRequest) -> Result<Val
         stage("reading the recordings");
         let assumed = Scenario::load(&inputs.scenario)?;
         let recordings = inputs.read_recordings()?;
-        let found = stylet_api::diagnose(&assumed, &recordings, stage)?;
+        let found = stylet_api::diagnose(&assumed, &recordings, &DiagnoseOptions::default(), stage)?;
         let output = found.output(&assumed, &inputs)?;
         stage("writing the results");
         output.write(&folder)?;

@@ -17,7 +17,8 @@ use stylet_api::DiagnosisInputs;
 
 Writes report.html, diagnosis.json and extended.ron: the scenario with re-fitted parameters and the
 effects found, ready for `stylet run` (give it a motion if the scenario says `Recorded`). The exit code
-is 0 whatever the verdict, 2 when an input is wrong.")]
+is 0 whatever the verdict, 1 when `stylet check` says that a diagnosis would mean nothing, 2 when an
+input is wrong.")]
 pub struct DiagnoseArgs {
     /// Assumed scenario, or a data set of repeated insertions (RON). Without one the layers are those that
     /// the recordings show, as `stylet identify` finds them.
@@ -35,6 +36,9 @@ pub struct DiagnoseArgs {
     /// Drop rows with backward or repeated time stamps, and report which.
     #[arg(long)]
     pub repair: bool,
+    /// Diagnose although `stylet check` says that the result would mean nothing.
+    #[arg(long)]
+    pub force: bool,
     #[command(flatten)]
     pub results: OutputArgs,
     #[command(flatten)]

@@ -6,7 +6,7 @@
 mod prediction_band;
 mod surface_friction_refit;
 
-use crate::diagnose::assumptions_of;
+use crate::base_law_fit::assumptions_of;
 use crate::diagnosis_json::Diagnosis;
 use crate::error::DiagnoseError;
 use crate::held_out::predict_free_run;

@@ -18,6 +18,7 @@ use crate::diagnosis_json::{
     Cause, Diagnosis, Estimate, Gain, NegligibleEffect, NoiseReport, RandomEffectSd, ResidualStructureReport,
     SearchCandidate, SearchStep, Verdict,
 };
+use crate::model_grade::grade;
 use crate::residual_tests;
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
@@ -209,6 +210,9 @@ fn diagnosis(
         agrees: false,
         grade: None,
         findings: Vec::new(),
+        check: Vec::new(),
+        by_recording: Vec::new(),
+        visible_effects: Vec::new(),
         partial: None,
         causes,
         base_parameters: base_parameters(&estimates, assumed),
@@ -248,6 +252,7 @@ fn diagnosis(
     };
     // The floor is what recordings predict of each other, so scatter between them is in it.
     claims::apply(&mut diagnosis, &Context::default());
+    diagnosis.grade = Some(grade(&diagnosis, 0.0));
     diagnosis
 }
 

@@ -153,20 +153,22 @@ def recordings(measured, names=None) -> tuple[list, list]:
     return given, kept
 
 
-def diagnose(assumed, measured, *, columns=None, repair: bool = False, names=None, progress=None) -> Diagnosis:
+def diagnose(
+    assumed, measured, *, columns=None, repair: bool = False, force: bool = False, names=None, progress=None
+) -> Diagnosis:
     """Compares an assumed scenario with measured recordings.
 
     `assumed`: path, RON text, dict or `Scenario`. `measured`: paths of CSV files, data frames, or dicts of arrays with
     `time_s`, `position_m`, `force_n` (and `velocity_mps`). With two or more the gain is measured on held-out recordings.
-    `columns`: path of a column map for the files. `progress`: True, False, or a callable `(text, count)`; by default shown
-    where tqdm is there. Ctrl-C ends it. Gives the same bytes as `stylet diagnose`."""
+    `columns`: path of a column map for the files. `force`: diagnose although `check` says that the result would mean nothing.
+    `progress`: True, False, or a callable `(text, count)`; by default shown where tqdm is there. Ctrl-C ends it. Gives the same bytes as `stylet diagnose`."""
     given, kept = recordings(measured, names)
     if not given:
         raise _stylet.StyletError("no recordings: give at least one")
     kind, text = _data.source(assumed)
     bar = _data.Progress(True if progress is None else progress)
     try:
-        inner = _stylet.diagnose(kind, text, given, columns and os.fspath(columns), repair, bar)
+        inner = _stylet.diagnose(kind, text, given, columns and os.fspath(columns), repair, force, bar)
     finally:
         bar.close()
     return Diagnosis(inner, kept, (columns and os.fspath(columns), repair))

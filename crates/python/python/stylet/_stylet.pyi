@@ -120,6 +120,7 @@ def diagnose(
     measured: Sequence[_Measured],
     columns: PathLike[str] | str | None = None,
     repair: bool = False,
+    force: bool = False,
     progress: _Progress = None,
 ) -> Diagnosis: ...
 def enhance(

@@ -2,8 +2,9 @@
 
 use crate::page_model::{Cell, Page, Section, Status, Table};
 use crate::pages::formatting::{effect_label, strength_parameters};
+use stylet_diagnose::check_json::{CheckItem, EffectVisibility, Light};
 use stylet_diagnose::claims::parameter_name;
-use stylet_diagnose::experiment_check::{ExperimentCheck, Light};
+use stylet_diagnose::experiment_check::ExperimentCheck;
 use stylet_scenario::Scenario;
 use stylet_stats::number_format::significant;
 
@@ -19,10 +20,9 @@ pub fn summary_sentence(check: &ExperimentCheck) -> &'static str {
     }
 }
 
-/// The page of a check of recordings against `scenario`.
-#[must_use]
-pub fn page(scenario: &Scenario, recordings: &[String], check: &ExperimentCheck) -> Page {
-    let items = check.items.iter().map(|item| {
+/// The aspects of a check as a table.
+pub(crate) fn items_table(items: &[CheckItem]) -> Table {
+    let row = |item: &CheckItem| {
         let status = match item.light {
             Light::Good => Status::Good,
             Light::Limited => Status::Warn,
@@ -33,7 +33,28 @@ pub fn page(scenario: &Scenario, recordings: &[String], check: &ExperimentCheck)
             Cell::text(item.light.name()).status(status),
             Cell::text(item.message.clone()),
         ]
-    });
+    };
+    Table::new("What these recordings allow", &["aspect", "", "reason"], items.iter().map(row).collect())
+}
+
+/// The smallest size of each effect that would be seen, as a table.
+pub(crate) fn effects_table(effects: &[EffectVisibility]) -> Table {
+    let row = |e: &EffectVisibility| {
+        let from = e.smallest.as_ref();
+        let from = from.map_or_else(|| "no plausible size".to_owned(), |s| strength_parameters(&e.effect, s));
+        let status = if e.visible { Status::Plain } else { Status::Warn };
+        vec![Cell::text(effect_label(&e.effect)), Cell::text(from).status(status)]
+    };
+    Table::new(
+        "Smallest size of each effect that would be seen",
+        &["effect", "from"],
+        effects.iter().map(row).collect(),
+    )
+}
+
+/// The page of a check of recordings against `scenario`.
+#[must_use]
+pub fn page(scenario: &Scenario, recordings: &[String], check: &ExperimentCheck) -> Page {
     let number = |x: f64| significant(x, 4);
     let parameters = check.base_parameters.iter().map(|b| {
         vec![
@@ -43,29 +64,15 @@ pub fn page(scenario: &Scenario, recordings: &[String], check: &ExperimentCheck)
             crate::pages::diagnosis::label_cell(&check.parameters, b.layer, None, &b.name),
         ]
     });
-    let effects = check.effects.iter().map(|e| {
-        let from = e.smallest.as_ref();
-        let from = from.map_or_else(|| "no plausible size".to_owned(), |s| strength_parameters(&e.effect, s));
-        let status = if e.visible { Status::Plain } else { Status::Warn };
-        vec![Cell::text(effect_label(&e.effect)), Cell::text(from).status(status)]
-    });
     Page::new(format!("Check: {}", scenario.name))
         .subtitle(summary_sentence(check))
         .fact("recordings", recordings.join(", "))
         .fact("stylet", env!("CARGO_PKG_VERSION"))
-        .section(Section::new("Before the fit").table(Table::new(
-            "What these recordings allow",
-            &["aspect", "", "reason"],
-            items.collect(),
-        )))
+        .section(Section::new("Before the fit").table(items_table(&check.items)))
         .section(Section::new("Parameters of the layers").table(Table::new(
             "As the recordings determine them when no effect is missing",
             &["parameter", "assumed", "95 % interval", "by these recordings"],
             parameters.collect(),
         )))
-        .section(Section::new("Effects").table(Table::new(
-            "Smallest size of each effect that would be seen",
-            &["effect", "from"],
-            effects.collect(),
-        )))
+        .section(Section::new("Effects").table(effects_table(&check.effects)))
 }

@@ -7,19 +7,20 @@ mod residual_charts;
 mod summary_sentence;
 
 pub(crate) use parameter_labels::label_cell;
-pub use parameter_labels::undetermined_parameters;
+pub use parameter_labels::{different_recordings, undetermined_parameters};
 pub use summary_sentence::{
     findings, general_forms, lower_limits, partial_model, recording_differences, summary_sentence,
 };
 
 use crate::page_model::{Page, Section, Status, Tile};
+use crate::pages::experiment_check::{effects_table, items_table};
 use crate::pages::formatting::data_quality_table;
 use crate::svg::{FigureOptions, figure};
 use causes_tables::{base_parameters, causes, negligible_effects, not_identifiable};
 use effect_search_steps::search_steps;
 use residual_charts::{
-    assumptions, base_law_residual, before_and_after, fit_chart, misfit_chart, remaining_structure,
-    worst_recording,
+    assumptions, base_law_residual, before_and_after, fit_chart, insertion, misfit_chart,
+    remaining_structure, worst_recording,
 };
 use std::fmt::Write as _;
 use stylet_diagnose::DiagnosisResult;
@@ -36,18 +37,24 @@ pub fn page(scenario: &Scenario, file: &str, command: String, examined: &Diagnos
     let all = recording_curves(examined);
     let blocks: usize = all.iter().map(|c| c.time_s.len()).sum();
     Page::new(format!("Diagnosis: {}", scenario.name))
-        .subtitle(summary_sentence(d))
+        .subtitle(match &d.grade {
+            Some(grade) => format!("{} Grade {:?}.", summary_sentence(d), grade.letter),
+            None => summary_sentence(d),
+        })
         .fact("scenario", file)
         .fact("recordings", d.gain.recordings.join(", "))
         .fact("blocks of 20 ms", blocks.to_string())
         .fact("stylet", env!("CARGO_PKG_VERSION"))
+        .section(Section::new("Before the fit").table(items_table(&d.check)))
         .section(verdict(d))
+        .section(insertion(d, examined, &all))
         .section(assumptions(scenario, d, &all))
         .section(causes(d))
         .section(base_parameters(d))
+        .section(parameter_labels::by_recording(d))
         .section(parameter_labels::correlations(d))
         .section(negligible_effects(d))
-        .section(not_identifiable(d))
+        .section(not_identifiable(d).table(effects_table(&d.visible_effects)))
         .section(remaining_structure(d, &all))
         .section(before_and_after(d, &all))
         .section(base_law_residual(d, examined, &all))
@@ -129,8 +136,12 @@ fn verdict(d: &Diagnosis) -> Section {
         .status(status),
     );
     let mut section = Section::new("Verdict").tiles(tiles);
-    let warnings: Vec<String> =
-        findings(d).into_iter().chain(partial_model(d)).chain(undetermined_parameters(d)).collect();
+    let warnings: Vec<String> = findings(d)
+        .into_iter()
+        .chain(partial_model(d))
+        .chain(undetermined_parameters(d))
+        .chain(different_recordings(d))
+        .collect();
     if !warnings.is_empty() {
         section = section.warnings(warnings);
     }

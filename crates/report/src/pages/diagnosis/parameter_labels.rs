@@ -1,8 +1,12 @@
 //! What the recordings say about each parameter, and how the estimates correlate.
 
-use crate::page_model::{Cell, Section, Status};
+use crate::page_model::{Cell, Section, Status, Table};
 use crate::svg::{FigureOptions, HeatMap, heat_map};
-use stylet_diagnose::diagnosis_json::{Diagnosis, LabelledParameter, ParameterLabel};
+use stylet_diagnose::claims::SIGNIFICANT_P_VALUE;
+use stylet_diagnose::diagnosis_json::{
+    Diagnosis, Estimate, LabelledParameter, ParameterByRecording, ParameterLabel,
+};
+use stylet_stats::number_format::{p_value, significant};
 
 /// Parameters that these recordings do not determine, in one sentence. Those at their bounds and puncture forces that were never reached
 /// have sentences of their own.
@@ -29,6 +33,46 @@ pub(crate) fn label_cell(
     let Some(p) = parameters.iter().find(is_it) else { return Cell::text("") };
     let status = if p.label == ParameterLabel::Determined { Status::Plain } else { Status::Warn };
     Cell::text(p.label_in_words()).status(status)
+}
+
+/// The parameters of each recording alone side by side, and whether they are one; nothing for a single recording.
+pub(super) fn by_recording(d: &Diagnosis) -> Section {
+    let section = Section::new("Each recording alone");
+    if d.by_recording.is_empty() {
+        return section;
+    }
+    let value = |e: &Option<Estimate>| {
+        Cell::number(e.map_or_else(String::new, |e| {
+            format!("{} ± {}", significant(e.value, 4), significant(0.5 * (e.high - e.low), 2))
+        }))
+    };
+    let rows = d.by_recording.iter().map(|p| {
+        let status = if is_different(d, p) { Status::Warn } else { Status::Plain };
+        let mut row = vec![Cell::text(p.parameter.clone()), Cell::number(p_value(p.p_value)).status(status)];
+        row.extend(p.estimates.iter().map(value));
+        row
+    });
+    let mut headers = vec!["parameter", "one value"];
+    headers.extend(d.gain.recordings.iter().map(String::as_str));
+    let title = "Parameters fitted to each recording alone, with 95 % intervals, and the p-value of their differences";
+    let section = section.table(Table::new(title, &headers, rows.collect()));
+    match different_recordings(d) {
+        Some(sentence) => section.warnings(vec![sentence]),
+        None => section.text("The recordings have one value of each parameter, as far as they determine it."),
+    }
+}
+
+/// Whether the recordings have different values of a parameter, with all parameters taken into account (Bonferroni).
+fn is_different(d: &Diagnosis, p: &ParameterByRecording) -> bool {
+    p.p_value * (d.by_recording.len() as f64) < SIGNIFICANT_P_VALUE
+}
+
+/// Parameters of which the recordings have different values, in one sentence.
+#[must_use]
+pub fn different_recordings(d: &Diagnosis) -> Option<String> {
+    let different = d.by_recording.iter().filter(|p| is_different(d, p));
+    let names: Vec<&str> = different.map(|p| p.parameter.as_str()).collect();
+    (!names.is_empty()).then(|| format!("the recordings differ in {}", names.join(", ")))
 }
 
 /// Heat map of the correlations between the estimates; nothing for fewer than two.

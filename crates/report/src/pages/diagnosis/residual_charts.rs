@@ -1,7 +1,7 @@
 //! Residuals of the base law and the extended model: over time, depth, velocity and frequency, and before against after.
 
 use super::summary_sentence::recording_differences;
-use crate::chart_model::{Chart, Level, LineStyle, MarkerSet, Scale, Series, Side};
+use crate::chart_model::{Chart, Level, LineStyle, MarkerSet, Needle, Scale, Series, Side};
 use crate::page_model::{Cell, Section, Status, Table};
 use crate::palette::Colour;
 use stylet_diagnose::DiagnosisResult;
@@ -61,6 +61,20 @@ pub(super) fn misfit_chart(d: &Diagnosis, c: &RecordingCurves, name: &str) -> Ch
         .with_series(line("extended model", Colour::Blue, &c.extended_residual_n).width(1.0))
         .with_level(Level::dotted(2.0 * d.noise.sd_n, "twice the noise of a single sample"))
         .with_level(Level::dotted(-2.0 * d.noise.sd_n, ""))
+}
+
+/// The recording that the base law fits worst, with a needle that moves through the layers.
+pub(super) fn insertion(d: &Diagnosis, examined: &DiagnosisResult, all: &[RecordingCurves]) -> Section {
+    let section = Section::new("The insertion");
+    let Some((c, name)) = worst_recording(d, all) else { return section };
+    let tissue = &reported_fit(examined).model.tissue;
+    let faces = (0..tissue.layers.len()).map(|k| tissue.front_m(k)).chain([tissue.end_m()]);
+    let needle = Needle {
+        time_s: c.time_s.clone(),
+        tip_mm: c.position_m.iter().map(|z| 1e3 * z).collect(),
+        faces_mm: faces.map(|m| 1e3 * m).collect(),
+    };
+    section.chart(fit_chart(c, name).with_needle(needle).group("insertion"))
 }
 
 /// Measured force of a recording, and the force fitted by the base law and by the extended model.

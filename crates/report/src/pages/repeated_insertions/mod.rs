@@ -35,7 +35,10 @@ pub fn page(
     let runs = runs.as_slice();
     let samples: usize = runs.iter().map(|r| r.recording.len()).sum();
     Page::new(format!("Diagnosis: {}", set.name))
-        .subtitle(summary_sentence(study))
+        .subtitle(match &study.diagnosis.grade {
+            Some(grade) => format!("{} Grade {:?}.", summary_sentence(study), grade.letter),
+            None => summary_sentence(study),
+        })
         .fact("data set", file)
         .fact("recordings", runs.len().to_string())
         .fact("samples", samples.to_string())
