@@ -39,3 +39,9 @@ pub use stylet_tissue as tissue;
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 pub struct Readme;
+
+/// The Rust examples of the documentation.
+#[cfg(doctest)]
+#[doc = include_str!("../docs/tutorials/core_in_your_loop.md")]
+#[doc = include_str!("../docs/reference/languages.md")]
+pub struct Documentation;

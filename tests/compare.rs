@@ -38,7 +38,7 @@ fn stylet_detects_every_rupture_of_every_row_and_the_paper_algorithm_does_not() 
     arguments.extend(["--seeds", "3"]);
     let table = compare(&scratch, "all", &arguments);
     assert_eq!(table.len(), 2 * files.len());
-    assert!(files.len() >= 16, "the rows of docs/enhancer.md");
+    assert!(files.len() >= 16, "the rows of docs/explanation/enhancer_accuracy.md");
     let errors = |r: &Value| r["missed"].as_u64().expect("missed") + r["false"].as_u64().expect("false");
     let (stylet_rows, paper): (Vec<&Value>, Vec<&Value>) =
         table.iter().partition(|r| r["algorithm"] == "Stylet");

@@ -1,4 +1,4 @@
-//! The table of `docs/enhancer.md`: detection, delay, stiffness errors, enhancement, coverage of the 95 % intervals, and false
+//! The table of `docs/explanation/enhancer_accuracy.md`: detection, delay, stiffness errors, enhancement, coverage of the 95 % intervals, and false
 //! alarms per hour of insertion, from the core and the tissue law.
 //!
 //! ```sh

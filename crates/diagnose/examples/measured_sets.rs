@@ -1,4 +1,4 @@
-//! Tables of `docs/measured.md` for the measured sets.
+//! Tables of `docs/explanation/measured.md` for the measured sets.
 //!
 //! ```sh
 //! STYLET_MEASURED=folder cargo run --release -p stylet-diagnose --example measured_sets

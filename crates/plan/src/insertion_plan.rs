@@ -113,7 +113,7 @@ pub struct Plan {
 }
 
 /// Share of correct unique diagnoses of one strong effect when everything is identifiable: 129 of 138 in
-/// `docs/diagnosis.md`, "The present engine". An upper bound on the probability of every plan.
+/// `docs/explanation/validation.md`, "One strong effect". An upper bound on the probability of every plan.
 pub const P_CORRECT_WHEN_DETECTABLE: f64 = 0.93;
 
 /// Probability that a gap with expectation `nats` exceeds the width of a class: its standard deviation is

@@ -64,7 +64,8 @@ fn render(page: &Page) -> String {
     let _ = writeln!(
         out,
         "<footer><p>{DISCLAIMER} Drawn by Stylet with uPlot (MIT licence, © 2022 Leon Sorokin). \
-         This file is self-contained and loads nothing from the network.</p></footer>"
+         This file is self-contained and loads nothing from the network. \
+         docs/how-to/read_your_report.md explains every plot and number.</p></footer>"
     );
     if !charts.is_empty() {
         let _ = writeln!(

@@ -1,5 +1,5 @@
 //! Scores of the online core: simulated recordings against their ground truth, measured recordings against the raw force. The
-//! scores are defined in `docs/reference/algorithms.md`.
+//! scores are defined in `docs/reference/model.md`.
 #![forbid(unsafe_code)]
 
 mod contact_finding;

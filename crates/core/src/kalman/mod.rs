@@ -1,5 +1,5 @@
 //! [`Algorithm::Stylet`](crate::config::Algorithm::Stylet): Kalman filters for the next force and for the layers, CUSUM
-//! rupture alarm, one pass, bounded work per sample. Derivation: `docs/enhancer.md`.
+//! rupture alarm, one pass, bounded work per sample. Derivation: `docs/explanation/enhancer.md`.
 
 mod air_decisions;
 mod air_history;

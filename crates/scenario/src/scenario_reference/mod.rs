@@ -154,16 +154,15 @@ fn range(p: &ParameterInfo) -> String {
 /// Names, equations and places of all effects: the table in `docs/reference/model.md`.
 #[must_use]
 pub fn effects_table() -> String {
-    let mut table = "| effect | acts on | equation | source |\n|---|---|---|---|\n".to_owned();
+    let mut table = "| effect | acts on | equation |\n|---|---|---|\n".to_owned();
     for info in all_effects() {
         let place = format!("{:?}", info.stage).to_lowercase();
         let _ = writeln!(
             table,
-            "| [`{}`](effects.md#{}) | {place} | `{}` | {} |",
+            "| [`{}`](effects.md#{}) | {place} | `{}` |",
             info.id,
             info.id,
-            info.equation.replace('|', "\\|"),
-            info.source
+            info.equation.replace('|', "\\|")
         );
     }
     table
@@ -175,7 +174,8 @@ pub fn effects_page() -> String {
     let mut page = "# Effects reference\n\n\
         Generated from the library; `cargo test -p stylet-scenario reference` with `STYLET_BLESS=1` writes it again.\n\n\
         Every effect has one name: `coulomb_friction` in outputs and on the command line, `CoulombFriction` in scenarios. Lines go into the list `effects: [...]` of a\n\
-        scenario. *Inactive* is the value at which a parameter has no effect, *typical* where a fit starts. Symbols: [model.md](model.md#symbols-and-signs).\n\n"
+        scenario. *Inactive* is the value at which a parameter has no effect, *typical* where a fit starts. Symbols: [model.md](model.md#symbols-and-signs).\n\n\
+        The pictures show the force of one insertion without and with the effect, and the difference; some have another size than the typical one, so that it can be seen.\n\n"
         .to_owned();
     let mut heading = "General effects";
     let _ = writeln!(page, "## {heading}\n");
@@ -208,7 +208,9 @@ pub fn effects_page() -> String {
         }
         let _ = writeln!(
             page,
-            "\nSignature: {}\nSource: {}.\n",
+            "\n![Force without and with {}](../figures/effects/{}.svg)\n\nSignature: {}\nSource: {}.\n",
+            info.id,
+            info.id,
             info.signature,
             info.source.trim_end_matches('.')
         );
