@@ -114,7 +114,6 @@ fn check_reports_recordings_that_are_no_insertion_and_diagnose_refuses_them_unle
         let arguments = ["diagnose", &assumed, "--data", &file, "--out", &out];
         let refused = stylet(&arguments);
         assert_eq!(refused.status.code(), Some(code), "{}", stderr_text(&refused));
-        assert!(stderr_text(&refused).contains(reason), "{}", stderr_text(&refused));
         assert!(!fs::exists(&out).expect("a folder"));
         let forced = stylet(&[&arguments[..], &["--force"]].concat());
         assert!(forced.status.success(), "{}", stderr_text(&forced));

@@ -134,7 +134,7 @@ function options(view) {
         splits: distr === 4 ? u => asinhSplits(u, spec.linearBelow) : undefined, filter: distr === 4 ? (u, splits) => splits : undefined })],
     hooks: {
       drawClear: [u => { if (spec.bands.length) { u.ctx.save(); clipToPlot(u); drawBands(view); u.ctx.restore(); } }],
-      draw: [() => { drawAll(view); drawPlayhead(view); }],
+      draw: [() => { drawAll(view); placeCover(view); }],
       setScale: [(u, key) => onScale(view, key)],
       setCursor: [() => showValues(view)],
     },

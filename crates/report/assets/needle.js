@@ -34,13 +34,11 @@ function drawNeedle(view) {
 }
 
 // Covers what lies behind the time of the needle.
-function drawPlayhead(view) {
-  if (!view.needle || view.playhead === null) return;
-  const { u } = view, { ctx, bbox } = u, px = u.valToPos(view.playhead, "x", true), right = bbox.left + bbox.width;
-  ctx.fillStyle = isDark() ? "#12161be0" : "#ffffffe0";
-  ctx.fillRect(px, bbox.top, Math.max(0, right - px), bbox.height);
-  ctx.strokeStyle = colour("ink"); ctx.lineWidth = uPlot.pxRatio; ctx.setLineDash([]);
-  ctx.beginPath(); ctx.moveTo(px, bbox.top); ctx.lineTo(px, bbox.top + bbox.height); ctx.stroke();
+function placeCover(view) {
+  if (!view.needle) return;
+  const { cover } = view.needle, left = view.playhead === null ? Infinity : view.u.valToPos(view.playhead, "x");
+  cover.hidden = !(left < view.u.over.clientWidth);
+  cover.style.left = Math.max(0, left) + "px";
 }
 
 function buildNeedle(view, number) {
@@ -50,7 +48,9 @@ function buildNeedle(view, number) {
   const time = payload.columns[view.spec.needle.time], tip = payload.columns[view.spec.needle.tip], faces = view.spec.needle.faces;
   const [shallowest, deepest] = finiteExtent(tip, 0, tip.length, isNumber);
   view.needle = { time, tip, faces, shallowest, deepest, deepestTime: time[tip.indexOf(deepest)], output,
-    canvas: document.getElementById("needle-" + number) };
+    canvas: document.getElementById("needle-" + number), cover: document.createElement("div") };
+  view.needle.cover.className = "cover";
+  view.u.over.append(view.needle.cover);
   view.needle.canvas.style.height = view.spec.height + "px";
   const first = time[0], last = time[time.length - 1];
   let started = null;
@@ -58,7 +58,7 @@ function buildNeedle(view, number) {
     view.playhead = share >= 1 ? null : first + share * (last - first);
     slider.value = 1000 * share;
     drawNeedle(view);
-    view.u.redraw();
+    placeCover(view);
   };
   const stop = () => { started = null; button.textContent = "Play"; };
   const frame = now => {
@@ -77,4 +77,5 @@ function buildNeedle(view, number) {
   slider.addEventListener("input", () => { stop(); show(Number(slider.value) / 1000); });
   view.repaint.push(() => drawNeedle(view));
   drawNeedle(view);
+  placeCover(view);
 }
