@@ -15,6 +15,7 @@ mod exit_codes;
 mod identify;
 mod inspect;
 mod listen;
+mod manual;
 mod output_args;
 mod plan;
 mod predict;
@@ -87,6 +88,8 @@ pub fn main() -> ExitCode {
         Command::Compare(args) => compare::compare(args),
         Command::Check(args) => check::check(args),
         Command::CompareModels(args) => compare_models::run(args),
+        Command::Completions(args) => manual::completions(args),
+        Command::Man(args) => manual::man(args),
         Command::Diagnose(args) => diagnose::diagnose(args),
         Command::Identify(args) => identify::identify(args),
         Command::Predict(args) => predict::predict(args),

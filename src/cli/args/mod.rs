@@ -3,6 +3,7 @@
 mod benchmark;
 mod diagnosis;
 mod inspect;
+mod manual;
 mod recordings;
 mod simulation;
 #[cfg(feature = "studio")]
@@ -18,6 +19,7 @@ pub use diagnosis::{
     PredictArgs, RefitArg,
 };
 pub use inspect::InspectArgs;
+pub use manual::{CompletionsArgs, ManArgs};
 pub use recordings::{ConvertArgs, EnhanceArgs, ListenArgs};
 pub use simulation::{AlgorithmArg, CompareArgs, ReproduceArgs, RunArgs};
 #[cfg(feature = "studio")]
@@ -84,6 +86,10 @@ pub enum Command {
     Studio(StudioArgs),
     /// Reproduce the paper's figures and test its claims, on one page.
     Reproduce(ReproduceArgs),
+    /// Print the completions of all commands for a shell.
+    Completions(CompletionsArgs),
+    /// Print the manual page of a command in troff.
+    Man(ManArgs),
 }
 
 #[cfg(test)]
