@@ -21,7 +21,7 @@ use stylet_identify::score_test::{ScoreTest, scale_strengths};
 use stylet_record::Recording;
 use stylet_scenario::Scenario;
 use stylet_score::{ContactFinding, ContactHypothesis, Trace};
-use stylet_tissue::{EffectInfo, general_effects};
+use stylet_tissue::EffectInfo;
 
 /// Speeds inside the tissue that differ by less than this factor count as one.
 const ONE_SPEED_FACTOR: f64 = 1.2;
@@ -148,7 +148,7 @@ pub fn check_experiment(
     out.parameters = label_parameters(&covariance, &data, &out.base_parameters, &[]).0;
     check_parameters(&mut out);
     let score_test = ScoreTest::new(&fit, &data);
-    let effects: Vec<&'static EffectInfo> = general_effects().collect();
+    let effects: Vec<&'static EffectInfo> = fit.model.assumed.candidates().collect();
     out.effects = effects.par_iter().filter_map(|info| visibility(info, &score_test)).collect();
     check_effects(&mut out);
     Ok(out)

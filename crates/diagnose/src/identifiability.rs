@@ -7,7 +7,7 @@ use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::EffectTerm;
 use stylet_identify::score_test::ScoreTest;
-use stylet_tissue::{ChainStage, EffectInfo, FitScale, Proposal, general_effects};
+use stylet_tissue::{ChainStage, EffectInfo, FitScale, Proposal};
 
 /// An effect of typical size that would gain less than this many nats is not identifiable.
 pub(crate) const MIN_DETECTABLE_NATS: f64 = 10.0;
@@ -16,8 +16,12 @@ pub(crate) const MIN_DETECTABLE_NATS: f64 = 10.0;
 #[must_use]
 pub fn not_identifiable(best: &Fit, data: &FitData) -> Vec<String> {
     let score_test = ScoreTest::new(best, data);
-    let entries: Vec<&'static EffectInfo> =
-        general_effects().filter(|i| best.model.effects.iter().all(|e| e.info.id != i.id)).collect();
+    let entries: Vec<&'static EffectInfo> = best
+        .model
+        .assumed
+        .candidates()
+        .filter(|i| best.model.effects.iter().all(|e| e.info.id != i.id))
+        .collect();
     let identifiable: Vec<bool> = entries.par_iter().map(|info| is_identifiable(info, &score_test)).collect();
     entries.iter().zip(identifiable).filter(|(_, s)| !s).map(|(i, _)| i.id.to_owned()).collect()
 }
@@ -83,7 +87,7 @@ pub fn advice(causes: &[Cause], not_identifiable: &[String], motion_period_s: Op
         ));
     }
     let hidden = |place: ChainStage| {
-        not_identifiable.iter().any(|i| stylet_tissue::effect_info(i).is_some_and(|e| e.stage == place))
+        not_identifiable.iter().any(|i| stylet_tissue::known_effect_info(i).is_some_and(|e| e.stage == place))
     };
     if hidden(ChainStage::Friction) {
         advice.push(

@@ -29,6 +29,9 @@ pub struct DiagnoseArgs {
     /// Recordings (CSV with header); different motions identify more than one. A data set names its own.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub data: Vec<PathBuf>,
+    /// Custom effects that are candidates, too: lists of `Custom(...)` (RON).
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub effects: Vec<PathBuf>,
     /// Column map: names and units of the logs' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
@@ -46,6 +49,7 @@ impl DiagnoseArgs {
     pub fn inputs(&self, scenario: &Path) -> DiagnosisInputs {
         DiagnosisInputs {
             scenario: scenario.to_owned(),
+            effects: self.effects.clone(),
             data: self.data.clone(),
             columns: self.columns.clone(),
             repair: self.repair,
@@ -140,6 +144,9 @@ pub struct CheckArgs {
     /// Recordings (CSV with header).
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     pub data: Vec<PathBuf>,
+    /// Custom effects that are candidates, too: lists of `Custom(...)` (RON).
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub effects: Vec<PathBuf>,
     /// Column map: names and units of the logs' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
@@ -185,6 +192,9 @@ pub struct IdentifiabilityArgs {
     /// Use motion and noise of these recordings (CSV with header) instead of a motion.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub data: Vec<PathBuf>,
+    /// Custom effects that are candidates, too: lists of `Custom(...)` (RON).
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub effects: Vec<PathBuf>,
     /// Column map: names and units of the logs' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
@@ -221,6 +231,9 @@ pub struct PlanArgs {
     /// With a scenario: recordings made so far (CSV with header).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub data: Vec<PathBuf>,
+    /// Custom effects that are candidates, too: lists of `Custom(...)` (RON).
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub effects: Vec<PathBuf>,
     /// Column map: names and units of the logs' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
@@ -241,8 +254,12 @@ pub struct PlanArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   stylet effects
-  stylet effects coulomb_friction")]
+  stylet effects coulomb_friction
+  stylet effects tip_rate_stiffening --effects effects/mine.ron")]
 pub struct EffectsArgs {
     /// Effect to describe, by its id [default: list all].
     pub name: Option<String>,
+    /// List or describe the custom effects of these files, too (RON).
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub effects: Vec<PathBuf>,
 }
