@@ -12,6 +12,7 @@ use std::str::from_utf8;
 use stylet::{Diagnosis, DiagnosisInputs, Limits, NamedRecording};
 use stylet_examine::challenge_export::AnswerKey;
 use stylet_examine::{Answer, CaseOutcome, Plan};
+use stylet_formula::{Formula, Unit};
 use stylet_record::{ColumnMap, ReadOptions, Recording, Truth, assess, read_csv, read_csv_bytes};
 use stylet_scenario::{EnhancerConfigFile, Motion, Scenario, motion_to_ron, parse};
 use stylet_sweep::score_gate::{Baseline, GatesFile};
@@ -127,6 +128,67 @@ fn sweeps_gates_configurations_and_column_maps_are_read_or_refused_with_a_positi
         let text = String::from_utf8_lossy(bytes);
         stylet::live_stream::parse_line(1, &text).is_ok_and(|given| given.is_some())
     });
+}
+
+#[test]
+fn formulas_are_compiled_or_refused_at_a_place_in_their_text() {
+    let names = ["t", "z", "v", "a", "z_layer", "inserted", "elastic", "friction", "k", "v0", "q"];
+    let units: Vec<Unit> = ["s", "m", "m/s", "m/s^2", "m", "m", "N", "N", "N/m", "m/s", "N"]
+        .iter()
+        .map(|unit| Unit::parse(unit).expect("a unit"))
+        .collect();
+    let corpus: Vec<Vec<u8>> = [
+        "k * max(0, z_layer) * log(1 + abs(v)/v0)",
+        "-q + elastic*(1 - exp(-t/2.5e0))",
+        "if(v > 0, k*z, friction) * tanh((v/v0)^2) / sqrt(1 + (a/9.81)^2)",
+        "sgn(v) * min(k*inserted, elastic) * sin(2*pi*t) - pow(2, 3) * sign(z) * atan(1)",
+    ]
+    .iter()
+    .map(|text| text.as_bytes().to_vec())
+    .collect();
+    fuzz("formula", 40_000, &corpus, |bytes| {
+        let Ok(text) = from_utf8(bytes) else { return false };
+        let place = |e: stylet_formula::FormulaError| {
+            assert!(e.start <= e.end && text.get(e.start..e.end).is_some(), "{text}: {e}");
+            assert!(!e.message.is_empty());
+        };
+        match Formula::parse(text, &names) {
+            Ok(formula) => {
+                if let Err(error) = formula.expect_unit(&units, Unit::NEWTON) {
+                    place(error);
+                }
+                let values = [2.0, 0.01, -0.003, 0.1, 0.004, 0.01, 0.4, f64::NAN, 1e300, 0.0, -1.0];
+                for index in 0..names.len() {
+                    let (value, _) = formula.program().evaluate_with_derivative(&values, index);
+                    let again = formula.program().evaluate(&values);
+                    assert!(
+                        value.to_bits() == again.to_bits() || (value.is_nan() && again.is_nan()),
+                        "{text}"
+                    );
+                }
+                true
+            }
+            Err(error) => {
+                place(error);
+                false
+            }
+        }
+    });
+}
+
+#[test]
+fn custom_effects_are_compiled_or_refused_with_a_position() {
+    let corpus = shipped("tests/custom_effects", 9000);
+    // Every accepted definition stays in memory, hence a target of its own kind.
+    let (accepted, total) = fuzz_any("custom", (3_000, Target::Slow), &corpus, |bytes| {
+        let Ok(text) = from_utf8(bytes) else { return false };
+        self::accepted(parse::<Vec<AnyEffect>>("a.ron", text)).is_some_and(|effects| {
+            let again = stylet_scenario::ron_options().to_string(&effects).expect("it can be serialised");
+            assert_eq!(parse::<Vec<AnyEffect>>("again.ron", &again).ok().as_ref(), Some(&effects), "{again}");
+            true
+        })
+    });
+    assert!(accepted > 0 && accepted < total, "{accepted} of {total}");
 }
 
 /// A scenario per effect of the library with typical parameters, as a diagnosis writes it as `extended.ron`.

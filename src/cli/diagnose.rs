@@ -6,7 +6,6 @@ use crate::cli::exit_codes::Failure;
 use crate::cli::terminal_output::stage_printer;
 use stylet_api::output_folder::{check_folder, recover_parent};
 use stylet_api::{DiagnoseOptions, resource_estimate};
-use stylet_scenario::Scenario;
 
 /// The command.
 ///
@@ -17,11 +16,19 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         if args.repeats {
             return Err(Failure::Check("--repeats needs a scenario or a data set".to_owned()));
         }
+        if !args.effects.is_empty() {
+            return Err(Failure::Check("--effects needs a scenario".to_owned()));
+        }
         return crate::cli::identify::diagnose(args);
     };
     // The scenario may be the result of an interrupted diagnosis.
     recover_parent(file)?;
     if args.repeats || stylet_diagnose::repeated_insertions::dataset::is_dataset(file)? {
+        if !args.effects.is_empty() {
+            let what =
+                "--effects has no meaning for repeats, which are compared with the effects of single layers";
+            return Err(Failure::Check(what.to_owned()));
+        }
         return crate::cli::diagnose_repeats::diagnose(args, file);
     }
     if args.data.is_empty() {
@@ -30,11 +37,11 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
                 .to_owned(),
         ));
     }
-    let scenario = Scenario::load(file)?;
-    args.limits.check(file, &resource_estimate::estimate_diagnose(&args.data), args.results.quiet)?;
     let inputs = args.inputs(file);
+    let scenario = inputs.load_scenario()?;
+    args.limits.check(file, &resource_estimate::estimate_diagnose(&args.data), args.results.quiet)?;
     let folder = args.results.output_folder(file, "-diagnosis");
-    let read = args.results.inputs(file, args.data.iter().chain(&args.columns));
+    let read = args.results.inputs(file, args.data.iter().chain(&args.columns).chain(&args.effects));
     check_folder(&folder, "diagnosis.json", &read)?;
     let progress = stage_printer(args.results.quiet, " ...");
     let recordings = inputs.read_recordings()?;

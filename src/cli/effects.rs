@@ -6,15 +6,19 @@ use crate::cli::terminal_output::print;
 use std::fmt::Write as _;
 use stylet_api::reference_insertion::{ReferenceInsertion, reference_insertion};
 use stylet_report::significant;
-use stylet_scenario::{closest_name, effect_line, renamed_ron_name};
-use stylet_tissue::{EffectInfo, effect_info, general_effects, per_layer_effects};
+use stylet_scenario::{closest_name, effect_line, load, renamed_ron_name};
+use stylet_tissue::{AnyEffect, Effect, EffectInfo, general_effects, per_layer_effects};
 
 /// Lists the effects, or shows one.
 ///
 /// # Errors
 /// [`Failure::Check`] for an effect that is not in the library.
 pub fn effects(args: &EffectsArgs) -> Result<(), Failure> {
-    let library = || general_effects().chain(per_layer_effects());
+    let mut own = Vec::new();
+    for file in &args.effects {
+        own.extend(load::<Vec<AnyEffect>>(file)?.iter().map(Effect::info));
+    }
+    let library = || general_effects().chain(per_layer_effects()).chain(own.iter().copied());
     let Some(name) = &args.name else {
         let mut text = String::new();
         for effect in library() {
@@ -25,7 +29,7 @@ pub fn effects(args: &EffectsArgs) -> Result<(), Failure> {
         return print(&text);
     };
     let id = snake_case(name);
-    match effect_info(&id) {
+    match library().find(|e| e.id == id) {
         Some(effect) => print(&describe(effect)),
         None => {
             let known: Vec<&str> = library().map(|e| e.id).collect();
@@ -59,7 +63,7 @@ fn closest_id<'a>(wrong: &str, known: &[&'a str]) -> Option<&'a str> {
     })
 }
 
-fn describe(effect: &EffectInfo) -> String {
+fn describe(effect: &'static EffectInfo) -> String {
     let mut out = String::new();
     let _ = writeln!(
         out,
@@ -86,7 +90,7 @@ fn describe(effect: &EffectInfo) -> String {
 }
 
 /// Text plot of the force over time, with (`#`) and without (`.`) the effect.
-fn reference_plot(entry: &EffectInfo) -> String {
+fn reference_plot(entry: &'static EffectInfo) -> String {
     const WIDTH: usize = 90;
     const HEIGHT: usize = 18;
     let ReferenceInsertion { parameters, base_n: base, with_effect_n: changed } = reference_insertion(entry);

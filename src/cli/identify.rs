@@ -69,6 +69,7 @@ fn run(
     let folder = args.results.output_folder(first, "-phantom");
     let inputs = DiagnosisInputs {
         scenario: folder.join(FOUND_FILE),
+        effects: Vec::new(),
         data: args.data.clone(),
         columns: args.columns.clone(),
         repair: args.repair,

@@ -22,10 +22,13 @@ use stylet_scenario::Motion;
 pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
     let limits = stylet_api::plan_insertion::load_limits(&args.limits)?;
     let inputs = if args.from.is_dir() {
-        DiagnosisInputs::from_folder(&args.from)?
+        let mut inputs = DiagnosisInputs::from_folder(&args.from)?;
+        inputs.effects.extend(args.effects.iter().cloned());
+        inputs
     } else {
         DiagnosisInputs {
             scenario: args.from.clone(),
+            effects: args.effects.clone(),
             data: args.data.clone(),
             columns: args.columns.clone(),
             repair: args.repair,
@@ -38,7 +41,7 @@ pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
     )?;
     let out = args.out.clone().unwrap_or_else(|| default_folder(&args.from, "-plan").join("plan.ron"));
     let mut read = vec![inputs.scenario.as_path(), args.limits.as_path()];
-    read.extend(inputs.data.iter().chain(&inputs.columns).map(PathBuf::as_path));
+    read.extend(inputs.data.iter().chain(&inputs.columns).chain(&inputs.effects).map(PathBuf::as_path));
     check_plan_files(&out, &read)?;
     let limit = args.resources.start_time_limit(&inputs.scenario);
     let progress = stage_printer(args.quiet, " ...");
@@ -152,6 +155,7 @@ fn summary(plan: &Plan) -> String {
 pub fn identifiability(args: &IdentifiabilityArgs) -> Result<(), Failure> {
     let inputs = DiagnosisInputs {
         scenario: args.scenario.clone(),
+        effects: args.effects.clone(),
         data: args.data.clone(),
         columns: args.columns.clone(),
         repair: args.repair,
@@ -164,7 +168,7 @@ pub fn identifiability(args: &IdentifiabilityArgs) -> Result<(), Failure> {
     let limit = args.resources.start_time_limit(&inputs.scenario);
     let progress = stage_printer(args.results.quiet, " ...");
     let folder = args.results.output_folder(&args.scenario, "-identifiability");
-    let others = args.data.iter().chain(&args.columns).chain(&args.motion);
+    let others = args.data.iter().chain(&args.columns).chain(&args.motion).chain(&args.effects);
     let read = args.results.inputs(&args.scenario, others);
     check_folder(&folder, "identifiability.json", &read)?;
     let found = stylet_api::plan_insertion::identifiability(&inputs, args.motion.as_deref(), &progress)?;

@@ -8,12 +8,16 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use stylet_diagnose::NamedRecording;
 use stylet_record::{ReadOptions, read_csv};
+use stylet_scenario::Scenario;
 
 /// Inputs of a diagnosis, as `inputs.json` holds them.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DiagnosisInputs {
     /// Scenario file.
     pub scenario: PathBuf,
+    /// Files of custom effects that are candidates, too.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub effects: Vec<PathBuf>,
     /// Files of the recordings.
     pub data: Vec<PathBuf>,
     /// File of the column map.
@@ -32,10 +36,23 @@ impl DiagnosisInputs {
         let full = |p: &PathBuf| std::path::absolute(p).unwrap_or_else(|_| p.clone());
         Self {
             scenario: full(&self.scenario),
+            effects: self.effects.iter().map(full).collect(),
             data: self.data.iter().map(full).collect(),
             columns: self.columns.as_ref().map(full),
             repair: self.repair,
         }
+    }
+
+    /// The scenario, with the effects of all files among its candidates.
+    ///
+    /// # Errors
+    /// [`Error::Input`] when a file is wrong.
+    pub fn load_scenario(&self) -> Result<Scenario, Error> {
+        let mut scenario = Scenario::load(&self.scenario)?;
+        for file in &self.effects {
+            scenario.add_candidates(file)?;
+        }
+        Ok(scenario)
     }
 
     /// The inputs of the diagnosis in a folder.

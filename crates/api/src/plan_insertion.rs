@@ -42,7 +42,7 @@ pub fn plan(
     simulated: bool,
     progress: &dyn Fn(&str),
 ) -> Result<PlanReport, Error> {
-    let scenario = Scenario::load(&inputs.scenario)?;
+    let scenario = inputs.load_scenario()?;
     let recordings = inputs.read_recordings()?;
     let at = [inputs.scenario.as_path(), limits_file];
     plan_after_recordings(scenario, &recordings, limits, simulated, at, progress)
@@ -156,7 +156,7 @@ pub fn identifiability(
     motion: Option<&Path>,
     progress: &dyn Fn(&str),
 ) -> Result<IdentifiabilityReport, Error> {
-    let mut scenario = Scenario::load(&inputs.scenario)?;
+    let mut scenario = inputs.load_scenario()?;
     if let Some(path) = motion {
         replace_motion(&mut scenario, path)?;
     }

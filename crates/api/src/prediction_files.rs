@@ -28,9 +28,7 @@ impl ModelOrigin {
         let diagnosis = diagnosis(&folder.join("diagnosis.json"))?;
         let assumed = match assumed {
             Some(path) => Some(Scenario::load(path)?),
-            None => DiagnosisInputs::from_folder(folder)
-                .ok()
-                .and_then(|inputs| Scenario::load(&inputs.scenario).ok()),
+            None => DiagnosisInputs::from_folder(folder).ok().and_then(|inputs| inputs.load_scenario().ok()),
         };
         Ok(Self { diagnosis, assumed })
     }

@@ -16,9 +16,9 @@ pub struct ReferenceInsertion {
 
 /// Insertion into three gels: ripple, hold at 10 s, advance at 14 s, retraction from 20 s on.
 #[must_use]
-pub fn reference_insertion(entry: &EffectInfo) -> ReferenceInsertion {
+pub fn reference_insertion(entry: &'static EffectInfo) -> ReferenceInsertion {
     let typical: Vec<f64> = entry.parameters.iter().map(|p| p.demonstration.unwrap_or(p.start)).collect();
-    let with: Vec<AnyEffect> = AnyEffect::from_parameters(entry.id, &typical).into_iter().collect();
+    let with: Vec<AnyEffect> = entry.with_parameters(&typical).into_iter().collect();
     ReferenceInsertion { base_n: force(&[]), with_effect_n: force(&with), parameters: typical }
 }
 

@@ -12,6 +12,7 @@ use stylet_identify::noise::{Noise, NoiseSource};
 use stylet_identify::rupture_assignment::assign_ruptures;
 use stylet_identify::update_event_times::update_event_times;
 use stylet_scenario::Scenario;
+use stylet_tissue::Effect;
 
 /// Prior of a scenario: its tissue, effects and tolerances.
 #[must_use]
@@ -20,6 +21,7 @@ pub fn assumptions_of(s: &Scenario) -> Assumptions {
     Assumptions {
         tissue: s.tissue.clone(),
         known_effects: s.effects.clone(),
+        further_effects: s.candidates.iter().map(Effect::info).collect(),
         tolerance: vec![s.tolerance; layers],
         thickness_tolerance: vec![s.thickness_tolerance; layers],
         surface_tolerance_m: s.surface_tolerance_m,

@@ -19,7 +19,7 @@ use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{EffectTerm, ZeroStep};
 use stylet_identify::noise::NoiseSource;
 use stylet_identify::score_test::ScoreTest;
-use stylet_tissue::{EffectInfo, Proposal, general_effects};
+use stylet_tissue::{EffectInfo, Proposal};
 
 /// A baseline that reduces the residual by this factor, to the noise, is not put to question by other effects.
 pub(crate) const DOMINANT_FACTOR: f64 = 10.0;
@@ -87,7 +87,8 @@ impl Baseline {
     /// The baseline of the recordings; `None` when nothing of it pays. With `exchange` a drop may also be a step instead of a rupture,
     /// or the reverse, which takes many fits; without, it has to leave only noise.
     fn fit(prepared: &PreparedRecordings, base: &Fit, data: &FitData, exchange: bool) -> Option<Self> {
-        let infos: Vec<&'static EffectInfo> = general_effects().filter(|i| i.baseline).collect();
+        let infos: Vec<&'static EffectInfo> =
+            base.model.assumed.candidates().filter(|i| i.baseline).collect();
         let candidates = zero_step_candidates(prepared);
         let jumps_up = candidates.steps.iter().flatten().any(|s| s.size_n > 0.0);
         if !jumps_up && unassigned(&candidates.drops, base).next().is_none() && !may_pay(&infos, base, data) {

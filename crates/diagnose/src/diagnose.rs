@@ -34,7 +34,7 @@ use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
 use stylet_identify::likelihood::FitData;
 use stylet_scenario::Scenario;
-use stylet_tissue::{AnyEffect, Effect};
+use stylet_tissue::Effect;
 
 /// Options of a diagnosis.
 #[derive(Clone, Copy, Debug, Default)]
@@ -381,10 +381,10 @@ fn extended_scenario(scenario: &Scenario, search: &Search, d: &Diagnosis) -> Sce
     let given: Vec<&str> = out.effects.iter().map(Effect::id).collect();
     let missing: Vec<&Cause> = d.causes.iter().filter(|c| !given.contains(&c.effect.as_str())).collect();
     for c in missing.into_iter().filter(|c| source.model.effects.iter().all(|e| e.info.id != c.effect)) {
-        let Some(info) = stylet_tissue::effect_info(&c.effect) else { continue };
+        let Some(info) = stylet_tissue::known_effect_info(&c.effect) else { continue };
         let values: Vec<f64> =
             info.parameters.iter().filter_map(|p| c.parameters.get(p.path)).map(|e| e.value).collect();
-        out.effects.extend(AnyEffect::from_parameters(info.id, &values));
+        out.effects.extend(info.with_parameters(&values));
     }
     out
 }

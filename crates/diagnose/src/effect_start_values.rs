@@ -8,7 +8,7 @@ use stylet_identify::fit::JacobianColumn;
 use stylet_identify::force_drops::ForceDrop;
 use stylet_identify::model::EffectTerm;
 use stylet_identify::score_test::{ScoreTest, ScoreTestResult, scale_strengths};
-use stylet_tissue::{ChainStage, EffectInfo, Proposal, general_effects};
+use stylet_tissue::{ChainStage, EffectInfo, Proposal};
 
 /// Best start values of every effect that the model does not include, at most two each, largest gain first.
 ///
@@ -20,7 +20,8 @@ pub fn effect_starts(
     tones_hz: &[f64],
 ) -> Vec<Vec<EffectStart>> {
     let included: Vec<&str> = score_test.fit.model.effects.iter().map(|e| e.info.id).collect();
-    let entries: Vec<&'static EffectInfo> = general_effects().filter(|i| !included.contains(&i.id)).collect();
+    let entries: Vec<&'static EffectInfo> =
+        score_test.fit.model.assumed.candidates().filter(|i| !included.contains(&i.id)).collect();
     let mut all: Vec<Vec<EffectStart>> = entries
         .par_iter()
         .map(|info| {

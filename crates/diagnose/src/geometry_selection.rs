@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit, fit_if_below};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{EffectTerm, FreeParameters, Model};
-use stylet_tissue::{ChainStage, EffectInfo, Proposal, general_effects};
+use stylet_tissue::{ChainStage, EffectInfo, Proposal};
 
 /// Largest deviation of the free parameters from a pattern, relative to its size.
 const PATTERN_TOLERANCE: f64 = 0.2;
@@ -149,7 +149,7 @@ fn boundary_shift_models(model: &Model) -> Vec<Model> {
         (layers[l].thickness_m - assumed, 1.0 / (sd * sd))
     };
     let mut out = Vec::new();
-    for info in general_effects().filter(moves) {
+    for info in prior.candidates().filter(moves) {
         for l in (1..model.layers()).filter(|l| out_of_tolerance(l - 1) || out_of_tolerance(*l)) {
             let ((front, wf), (back, wb)) = (deviation(l - 1), deviation(l));
             let shift = (wf * front - wb * back) / (wf + wb);
@@ -199,7 +199,7 @@ fn geometry_effects(model: &Model, passed_last_boundary: bool) -> Vec<EffectTerm
     let tolerated = |l: usize, by: f64| by <= model.assumed.thickness_tolerance[l] * assumed[l].thickness_m;
     let included = |id: &str| model.effects.iter().any(|e| e.info.id == id);
     let mut out = Vec::new();
-    for info in general_effects().filter(|i| !included(i.id)) {
+    for info in model.assumed.candidates().filter(|i| !included(i.id)) {
         match info.proposal {
             Proposal::LayerFaces(_) => {
                 for l in 0..deviation_m.len().saturating_sub(1) {

@@ -11,7 +11,7 @@ use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::EffectTerm;
 use stylet_identify::score_test::{ScoreTest, scale_strengths};
-use stylet_tissue::{ChainStage, EffectInfo, FitScale, Proposal, general_effects};
+use stylet_tissue::{ChainStage, EffectInfo, FitScale, Proposal};
 
 /// Nats that the search requires of an effect with two parameters, about.
 const REQUIRED_NATS: f64 = 12.0;
@@ -38,7 +38,7 @@ pub fn visible_effects(best: &Fit, data: &FitData) -> Vec<EffectVisibility> {
 }
 
 fn missing_effects(fit: &Fit) -> impl Iterator<Item = &'static EffectInfo> + '_ {
-    general_effects().filter(|i| fit.model.effects.iter().all(|e| e.info.id != i.id))
+    fit.model.assumed.candidates().filter(|i| fit.model.effects.iter().all(|e| e.info.id != i.id))
 }
 
 fn visibility(info: &'static EffectInfo, score_test: &ScoreTest) -> Option<EffectVisibility> {
@@ -129,7 +129,7 @@ pub fn advice(causes: &[Cause], not_identifiable: &[String], motion_period_s: Op
         ));
     }
     let hidden = |place: ChainStage| {
-        not_identifiable.iter().any(|i| stylet_tissue::effect_info(i).is_some_and(|e| e.stage == place))
+        not_identifiable.iter().any(|i| stylet_tissue::known_effect_info(i).is_some_and(|e| e.stage == place))
     };
     if hidden(ChainStage::Friction) {
         advice.push(

@@ -26,6 +26,7 @@ pub fn assumed_layers(layers: &[[f64; 3]]) -> Arc<Assumptions> {
     Arc::new(Assumptions {
         tissue: Tissue { surface_m: 0.0, layers: layers.iter().map(layer).collect() },
         known_effects: Vec::new(),
+        further_effects: Vec::new(),
         tolerance: vec![0.3; layers.len()],
         thickness_tolerance: vec![0.1; layers.len()],
         surface_tolerance_m: 0.01,
@@ -128,6 +129,7 @@ pub fn fit_from_truth(effects: &[AnyEffect], runs: &[&SegmentedRecording]) -> Se
     let assumed = Assumptions {
         tissue: gel_tissue(),
         known_effects: Vec::new(),
+        further_effects: Vec::new(),
         tolerance: vec![4.0],
         thickness_tolerance: vec![0.0],
         surface_tolerance_m: 2e-3,

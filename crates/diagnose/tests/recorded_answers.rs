@@ -53,6 +53,7 @@ fn two_layers() -> Scenario {
             ],
         },
         effects: Vec::new(),
+        candidates: Vec::new(),
         motion: Motion::Recorded,
         robot: Default::default(),
         sensor: Default::default(),

@@ -51,6 +51,7 @@ pub(crate) fn base_model(
     let assumptions = Assumptions {
         tissue: Tissue { surface_m, layers: layers.iter().map(layer).collect() },
         known_effects: Vec::new(),
+        further_effects: Vec::new(),
         tolerance: vec![tolerance; layers.len()],
         thickness_tolerance: vec![thickness_tolerance; layers.len()],
         surface_tolerance_m: 0.002,

@@ -27,6 +27,7 @@ fn assumptions() -> Assumptions {
             ],
         },
         known_effects: Vec::new(),
+        further_effects: Vec::new(),
         tolerance: vec![0.3; 3],
         thickness_tolerance: vec![0.1; 3],
         surface_tolerance_m: 0.002,

@@ -13,7 +13,7 @@ use stylet_identify::likelihood::motion_pieces;
 use stylet_identify::model::{EffectTerm, Model};
 use stylet_identify::noise::Noise;
 use stylet_scenario::{Motion, Scenario};
-use stylet_tissue::{AnyEffect, Effect, general_effects};
+use stylet_tissue::{AnyEffect, Effect};
 
 /// Total probability of effects that were not detected.
 const OTHER_EFFECTS_PROBABILITY: f64 = 0.5;
@@ -76,7 +76,9 @@ pub fn from_diagnosis(
     }
     let sum: f64 = candidates.iter().map(|c| c.probability).sum();
     let named: Vec<&str> = base.effects.iter().map(|e| e.info.id).collect();
-    let others: Vec<EffectTerm> = general_effects()
+    let others: Vec<EffectTerm> = base
+        .assumed
+        .candidates()
         .filter(|i| d.not_identifiable.iter().any(|n| n == i.id) && !named.contains(&i.id))
         .filter(|i| candidates.iter().all(|c| c.name != i.id))
         .filter_map(typical_effect)
@@ -120,7 +122,8 @@ pub fn from_recordings(
     let mut candidates = vec![Candidate::without_effect(1.0 - OTHER_EFFECTS_PROBABILITY)];
     let found = |id: &str| base.effects.iter().any(|e| e.info.id == id);
     candidates.extend(
-        general_effects()
+        base.assumed
+            .candidates()
             .filter(|i| !found(i.id))
             .filter_map(typical_effect)
             .map(|c| Candidate::with_effect(c, 0.02)),
@@ -150,7 +153,7 @@ pub fn from_scenario(
     }
     let known: Vec<&str> = scenario.effects.iter().map(|e| e.info().id).collect();
     let terms: Vec<EffectTerm> =
-        general_effects().filter(|i| !known.contains(&i.id)).filter_map(typical_effect).collect();
+        base.assumed.candidates().filter(|i| !known.contains(&i.id)).filter_map(typical_effect).collect();
     let each = OTHER_EFFECTS_PROBABILITY / terms.len().max(1) as f64;
     let mut candidates = vec![Candidate::without_effect(1.0 - OTHER_EFFECTS_PROBABILITY)];
     candidates.extend(terms.into_iter().map(|c| Candidate::with_effect(c, each)));

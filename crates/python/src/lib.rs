@@ -37,7 +37,7 @@ mod _stylet {
     #[pymodule_export]
     use super::plan::{Plan, plan};
     #[pymodule_export]
-    use super::run::{Run, check_scenario, load_scenario, read_csv, simulate};
+    use super::run::{Run, add_effects, check_scenario, load_scenario, read_csv, simulate};
     #[pymodule_export]
     use super::sweep::{Sweep, sweep};
 

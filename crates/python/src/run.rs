@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use stylet::Scenario;
 use stylet::core::config::Model;
 use stylet::score::Trace;
+use stylet::tissue::AnyEffect;
 
 /// A scenario from a file (`"path"`), from RON text (`"ron"`) or from JSON (`"json"`, what a dict becomes).
 pub fn parse(kind: &str, source: &str) -> PyResult<Scenario> {
@@ -39,6 +40,25 @@ pub fn check_scenario(kind: &str, source: &str) -> PyResult<()> {
 #[pyfunction]
 pub fn load_scenario(kind: &str, source: &str) -> PyResult<String> {
     parse(kind, source)?.to_ron().map_err(failure)
+}
+
+/// A scenario with further effects and candidates, each as JSON.
+#[pyfunction]
+pub fn add_effects(ron: &str, effects: Vec<String>, candidates: Vec<String>) -> PyResult<String> {
+    let mut scenario = parse("ron", ron)?;
+    let read = |all: Vec<String>| -> PyResult<Vec<AnyEffect>> {
+        let one = |text: String| {
+            serde_json::from_str(&text).map_err(|e| {
+                let text = e.to_string();
+                failure(text.split(" at line ").next().unwrap_or(&text).to_owned())
+            })
+        };
+        all.into_iter().map(one).collect()
+    };
+    scenario.effects.extend(read(effects)?);
+    scenario.candidates.extend(read(candidates)?);
+    scenario.check().map_err(|p| failure(format!("scenario: {}: {}", p.path, p.message)))?;
+    scenario.to_ron().map_err(failure)
 }
 
 /// Reads a recording: columns and notes on the quality of the data.

@@ -2,8 +2,8 @@
 
 use crate::input_error::InputError;
 use crate::parse_error_message::explain_parse_error;
+use crate::ron_dialect::ron_options;
 use crate::ron_outline::RonOutline;
-use ron::extensions::Extensions;
 use serde::de::DeserializeOwned;
 use std::io::Read;
 use std::path::Path;
@@ -12,13 +12,6 @@ use std::path::Path;
 const MAX_FILE_BYTES: u64 = 4 << 20;
 
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
-
-/// The RON dialect of all files: `Some` may be left out, effects and sensors take one pair of brackets.
-#[must_use]
-pub fn ron_options() -> ron::Options {
-    ron::Options::default()
-        .with_default_extension(Extensions::IMPLICIT_SOME | Extensions::UNWRAP_VARIANT_NEWTYPES)
-}
 
 /// A value that parses but is out of range: path of the field, cause and remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]

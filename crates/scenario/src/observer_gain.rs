@@ -92,7 +92,7 @@ impl<'de> Visitor<'de> for OneOrSeven {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::load_ron::ron_options;
+    use crate::ron_dialect::ron_options;
 
     #[test]
     fn one_number_or_seven_are_read_and_written_back() {

@@ -5,15 +5,42 @@ use crate::renamed_names::renamed_ron_name;
 use crate::ron_outline::RonOutline;
 use crate::ron_tokens::{TokenKind, tokenize};
 use ron::error::{Error, SpannedError};
+use stylet_tissue::{Custom, CustomText};
 
 /// The error with its location and message.
 pub(crate) fn explain_parse_error(file: &str, text: &str, error: &SpannedError) -> InputError {
     let outline = RonOutline::new(text);
     let start = offset(text, error.span.start.line, error.span.start.col);
     let end = offset(text, error.span.end.line, error.span.end.col);
+    if let Error::Message(_) = &error.code
+        && let Some((start, end, what)) = custom_effect_error(text, &outline, start)
+    {
+        return InputError::at(file, text, start, end, what);
+    }
     let place = ErrorLocation { text, outline: &outline, start, end };
     let (start, end, what) = place.explain(&error.code);
     InputError::at(file, text, start, end, what)
+}
+
+/// The error of the custom effect that was read last at byte `at`: bytes to underline, and the message.
+fn custom_effect_error(text: &str, outline: &RonOutline, at: usize) -> Option<(usize, usize, String)> {
+    let before = outline.entries.iter().rev().filter(|e| e.start < at);
+    let (entry, body) =
+        before.filter_map(|e| Some((e, text.get(e.start..e.end)?.strip_prefix("Custom")?))).next()?;
+    let custom: CustomText = crate::ron_dialect::ron_options().from_str(body).ok()?;
+    let error = Custom::from_text(&custom).err()?;
+    let path =
+        if entry.path.is_empty() { error.path.clone() } else { format!("{}.{}", entry.path, error.path) };
+    let what = format!("{path}: {}", error.message);
+    let Some(field) = outline.locate(&path) else { return Some((entry.start, entry.end, what)) };
+    match error.place {
+        // Behind the quote that opens the formula.
+        Some((start, end)) if text.get(field.start..)?.starts_with('"') => {
+            let first = field.start + 1;
+            Some(((first + start).min(field.end), (first + end).min(field.end), what))
+        }
+        _ => Some((field.start, field.end, what)),
+    }
 }
 
 fn list(names: &[&str]) -> String {

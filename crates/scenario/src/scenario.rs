@@ -25,6 +25,9 @@ pub struct Scenario {
     /// Departures from the base law.
     #[serde(default)]
     pub effects: Vec<AnyEffect>,
+    /// Custom effects that a diagnosis searches for like those of the library; a simulation ignores them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub candidates: Vec<AnyEffect>,
     /// The motion.
     pub motion: Motion,
     /// What moves the needle.
@@ -90,6 +93,7 @@ impl Scenario {
             source: String::new(),
             tissue,
             effects: Vec::new(),
+            candidates: Vec::new(),
             motion,
             robot: Robot::default(),
             sensor: Sensor::default(),
@@ -149,7 +153,7 @@ impl Scenario {
     /// When a value cannot be written as RON, which no checked scenario holds.
     pub fn to_ron(&self) -> Result<String, ron::Error> {
         let pretty = ron::ser::PrettyConfig::new().struct_names(false).depth_limit(8);
-        let body = crate::load_ron::ron_options().to_string_pretty(self, pretty)?;
+        let body = crate::ron_dialect::ron_options().to_string_pretty(self, pretty)?;
         Ok(format!("Scenario{body}\n"))
     }
 }

@@ -32,6 +32,7 @@ fn inputs(studio: &mut Studio, files: &[String]) -> Result<DiagnosisInputs, Prob
     studio.keep()?;
     Ok(DiagnosisInputs {
         scenario: studio.workspace.path(PHANTOM),
+        effects: Vec::new(),
         data: files.iter().map(|file| studio.workspace.data(file)).collect::<Result<_, _>>()?,
         columns: studio.map_file(),
         repair: false,
@@ -65,7 +66,7 @@ pub fn start_diagnosis(studio: &mut Studio, request: FilesRequest) -> Result<Val
     let folder = studio.workspace.path(DIAGNOSIS);
     launch(studio, "diagnose", move |stage| {
         stage("reading the recordings");
-        let assumed = Scenario::load(&inputs.scenario)?;
+        let assumed = inputs.load_scenario()?;
         let recordings = inputs.read_recordings()?;
         let found = stylet_api::diagnose(&assumed, &recordings, &DiagnoseOptions::default(), stage)?;
         let output = found.output(&assumed, &inputs)?;

@@ -10,7 +10,7 @@ use stylet_api::{Diagnosis, Limits, Scenario};
 use stylet_report::pages::diagnosis::{recording_differences, summary_sentence};
 use stylet_report::significant;
 use stylet_scenario::Motion;
-use stylet_tissue::effect_info;
+use stylet_tissue::known_effect_info;
 
 pub const DIAGNOSIS: &str = "diagnosis";
 pub const EXTENDED: &str = "diagnosis/extended.ron";
@@ -82,7 +82,7 @@ fn diagnosis_view(d: &Diagnosis) -> Value {
     let interval = |low: f64, high: f64| format!("{} to {}", number(low), number(high));
     let causes = d.causes.iter().map(|c| {
         let mut lines = vec![format!("confidence {}", significant(c.confidence, 3))];
-        let info = |path: &str| effect_info(&c.effect)?.parameters.iter().find(|p| p.path == path);
+        let info = |path: &str| known_effect_info(&c.effect)?.parameters.iter().find(|p| p.path == path);
         lines.extend(c.parameters.iter().map(|(path, e)| {
             let (name, unit) = info(path).map_or((path.as_str(), ""), |p| (p.meaning, p.unit));
             format!("{name}: {} {unit} (95 %: {})", number(e.value), interval(e.low, e.high))

@@ -6,7 +6,7 @@ use crate::force_sensor::ForceSensor;
 use crate::slide_insertion::{InsertionSample, SampleRates, simulate_on_slide, simulate_replay};
 use crate::virtual_sensor_accuracy::VirtualSensorAccuracy;
 use stylet_record::{LayerTruth, Recording, TrueRupture, Truth};
-use stylet_scenario::{FieldError, ForceTorque, MotionPoint, Robot, Scenario, Sensor};
+use stylet_scenario::{FieldError, ForceTorque, MotionPlan, MotionPoint, Robot, Scenario, Sensor};
 use stylet_tissue::{AnyEffect, ChainStage, Effect, ForceLaw, Rupture, Slab, TooManyEffects};
 
 /// Why a scenario cannot be simulated.
@@ -23,6 +23,19 @@ pub enum SimulateError {
     /// A value is out of range; scenarios that were checked have none.
     #[error("{}: {}", .0.path, .0.message)]
     InvalidScenario(FieldError),
+    /// An effect that is not in the library has no value, or one beyond all measure, at its parameters.
+    #[error(
+        "the force is {force_n} N at {time_s} s with {effects}: the formula has no value there, or grows without limit; change its parameters, or the \
+         formula"
+    )]
+    NotFinite {
+        /// The force in N.
+        force_n: f64,
+        /// When, in s.
+        time_s: f64,
+        /// Ids of the effects that are not in the library.
+        effects: String,
+    },
     /// The arm cannot execute the motion.
     #[error(transparent)]
     Arm(#[from] ArmError),
@@ -141,6 +154,7 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
     };
     let mut force_sensor = ForceSensor::new(&scenario.effects, sensor, seed, scenario.sample_hz);
     let rates = sample_rates(scenario, plan.duration_s());
+    check_custom_effects(scenario, &plan, &law, &rates)?;
     let mut ruptures = Vec::new();
     let mut columns = Columns::with_capacity(rates.samples, scenario.tissue.surface_m);
     let on_rupture = |r: Rupture| {
@@ -191,6 +205,42 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
         motion: columns.motion,
         sensor: sensor.map(|sensor| (scenario.effects.clone(), sensor, scenario.sample_hz)),
     })
+}
+
+/// Largest force in N of a simulation with custom effects; a physics engine loses its digits beyond.
+const MAX_FORCE_N: f64 = 1e6;
+
+/// Replays the motion with effects that are not in the library, whose forces may have no value.
+fn check_custom_effects(
+    scenario: &Scenario,
+    plan: &MotionPlan,
+    law: &ForceLaw,
+    rates: &SampleRates,
+) -> Result<(), SimulateError> {
+    let custom: Vec<&str> = scenario
+        .effects
+        .iter()
+        .filter(|e| e.info().custom.is_some() && !e.is_inactive())
+        .map(Effect::id)
+        .collect();
+    if custom.is_empty() {
+        return Ok(());
+    }
+    let mut sensor = ForceSensor::new(&scenario.effects, &ForceTorque::default(), 0, rates.sample_hz);
+    let mut wrong = None;
+    let check = |s: &InsertionSample| {
+        let forces = [s.force.total_n, s.force.elastic_n, sensor.measure(s)];
+        if let Some(force_n) = forces.into_iter().find(|f| f.is_nan() || f.abs() > MAX_FORCE_N) {
+            wrong.get_or_insert((s.time_s, force_n));
+        }
+    };
+    simulate_replay(plan, law, rates, |_| {}, check);
+    match wrong {
+        None => Ok(()),
+        Some((time_s, force_n)) => {
+            Err(SimulateError::NotFinite { force_n, time_s, effects: custom.join(", ") })
+        }
+    }
 }
 
 /// Moves the columns of the arm into the recording and returns the force of each sensor.

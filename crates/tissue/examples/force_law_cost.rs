@@ -57,6 +57,36 @@ fn chain_ns(effects: &[AnyEffect]) -> f64 {
     })
 }
 
+/// Three effects of the library as formulas.
+fn twins() -> [(&'static str, CustomText); 3] {
+    let parameter = |start: f64, unit: &str, inactive: Option<f64>| ParameterText {
+        start,
+        value: None,
+        prior: None,
+        unit: unit.into(),
+        inactive,
+        meaning: String::new(),
+    };
+    let text = |place, force: &str, parameters, state| CustomText {
+        name: "twin".into(),
+        place,
+        force: force.into(),
+        parameters: NamedList(parameters),
+        state: NamedList(state),
+        source: String::new(),
+    };
+    let kappa = vec![("kappa".into(), parameter(10.0, "1/m", Some(0.0)))];
+    let c = vec![("c".into(), parameter(3.0, "N/m", Some(0.0)))];
+    let relaxing =
+        vec![("g".into(), parameter(0.3, "", Some(0.0))), ("tau".into(), parameter(2.0, "s", None))];
+    let q = vec![("q".into(), "dq/dt = (g*elastic - q)/tau".into())];
+    [
+        ("nonlinear_elasticity", text(Place::Elastic, "elastic * kappa * max(0, z_layer)", kappa, vec![])),
+        ("coulomb_friction", text(Place::Friction, "c * sgn(v) * inserted", c, vec![])),
+        ("stress_relaxation", text(Place::Elastic, "-q", relaxing, q)),
+    ]
+}
+
 fn main() -> Result<(), TooManyEffects> {
     println!("{:<36} {:>8}", "", "ns/sample");
     println!("{:<36} {:>8.1}", "base law", law_ns(&[])?);
@@ -71,6 +101,10 @@ fn main() -> Result<(), TooManyEffects> {
             println!("{:<36} {ns:>8.1}", format!("{} x{}{where_}", info.id, info.parameters.len()));
             variant = info.extended;
         }
+    }
+    for (twin, text) in twins() {
+        let Ok(effect) = Custom::from_text(&text) else { continue };
+        println!("{:<36} {:>8.1}", format!("{twin} as a formula"), law_ns(&[effect.into()])?);
     }
     let three = ["stress_relaxation", "coulomb_friction", "incomplete_release"];
     let three: Vec<AnyEffect> = three

@@ -10,7 +10,7 @@
 //! continues from there (without viscous friction the tip jumps). Where the force jumps at the dead band of `sgn` (dry
 //! friction), the root may lie in the jump: the tip sticks, and the friction is what the spring force requires.
 
-use crate::effect::{SGN_DEAD_BAND_MPS, sgn};
+use crate::effect::{SGN_DEAD_BAND_MPS, TipState, sgn};
 use crate::force::{Rupture, TissueForce};
 use crate::force_law::ForceLaw;
 use crate::force_law_state::ForceLawState;
@@ -141,7 +141,10 @@ impl ForceLaw {
             if let Some(slab) = self.slabs.get(state.ruptured) {
                 elastic = match force {
                     Some(force) => force.elastic_n,
-                    None => self.layer_elastic_force(state.ruptured, slab, dt, z, &mut state.effects),
+                    None => {
+                        let tip = state.tip_state(time_s, z, v);
+                        self.layer_elastic_force(slab, &tip, &mut state.effects)
+                    }
                 };
                 if let Some(rupture) = self.try_rupture(state, slab, dt, (z, v), elastic, 0.0, policy) {
                     let share = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
@@ -227,11 +230,14 @@ impl ForceLaw {
     /// Force at a trial value of the unknown, without ruptures.
     fn trial(&self, state: &mut ForceLawState, step: &Step, u: f64) -> TissueForce {
         let (z_m, v_mps) = step.tip(u);
+        let tip = state.tip_state(state.time_s + step.dt, z_m, v_mps);
         let elastic = match self.slabs.get(state.ruptured) {
-            Some(slab) => self.layer_elastic_force(state.ruptured, slab, step.dt, z_m, &mut state.effects),
+            Some(slab) => {
+                self.layer_elastic_force(slab, &TipState { dt_s: step.dt, ..tip }, &mut state.effects)
+            }
             None => 0.0,
         };
-        self.total_force(&state.tip_state(state.time_s + step.dt, z_m, v_mps), elastic, &mut state.effects)
+        self.total_force(&tip, elastic, &mut state.effects)
     }
 
     /// Derivative of the residual by the unknown, from stiffness and viscous friction only.

@@ -40,8 +40,38 @@ pub struct TipState {
     pub dz_m: f64,
     /// Tip velocity in m/s.
     pub v_mps: f64,
+    /// Change of the tip velocity since the previous sample in m/s; zero at the first.
+    pub dv_mps: f64,
     /// Number of ruptured layers.
     pub ruptured: usize,
+}
+
+/// Forces and layers in one sample, for effects along the shaft and at the tip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InsertionState<'a> {
+    /// Length of needle inside the tissue in metres.
+    pub inside_m: f64,
+    /// The layers in space.
+    pub slabs: &'a [Slab],
+    /// Elastic force in N.
+    pub elastic_n: f64,
+    /// Friction along the shaft in N by the base law and the effects before; zero at [`ChainStage::Release`].
+    pub friction_n: f64,
+}
+
+/// Motion of the needle's base in one sample, for effects between tissue and sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BaseMotion {
+    /// Time in seconds.
+    pub time_s: f64,
+    /// Time since the previous sample in seconds; zero at the first.
+    pub dt_s: f64,
+    /// Position in metres.
+    pub z_m: f64,
+    /// Velocity in m/s.
+    pub v_mps: f64,
+    /// Acceleration in m/s².
+    pub a_mps2: f64,
 }
 
 /// One departure from the base law.
@@ -85,8 +115,9 @@ pub trait Effect {
         force_n
     }
 
-    /// [`ChainStage::Relaxation`]: elastic force in N after relaxation. Called once per sample and active layer.
-    fn relax(&self, _dt_s: f64, elastic_n: f64, _state: &mut EffectState) -> f64 {
+    /// [`ChainStage::Relaxation`]: elastic force in N after relaxation, with the tip `depth_m` behind the front face of the
+    /// active layer. Called once per sample and active layer.
+    fn relax(&self, _tip: &TipState, _depth_m: f64, elastic_n: f64, _state: &mut EffectState) -> f64 {
         elastic_n
     }
 
@@ -128,9 +159,8 @@ pub trait Effect {
         1.0
     }
 
-    /// [`ChainStage::Friction`]: a force in N added to the shaft friction, for a length `inside_m` of needle inside the
-    /// tissue.
-    fn shaft_force(&self, _tip: &TipState, _inside_m: f64, _state: &mut EffectState) -> f64 {
+    /// [`ChainStage::Friction`]: a force in N added to the shaft friction.
+    fn shaft_force(&self, _tip: &TipState, _at: &InsertionState, _state: &mut EffectState) -> f64 {
         0.0
     }
 
@@ -169,13 +199,12 @@ pub trait Effect {
     }
 
     /// [`ChainStage::Release`] and [`ChainStage::Tip`]: a force in N added at the tip.
-    fn tip_force(&self, _tip: &TipState, _slabs: &[Slab], _state: &mut EffectState) -> f64 {
+    fn tip_force(&self, _tip: &TipState, _at: &InsertionState, _state: &mut EffectState) -> f64 {
         0.0
     }
 
-    /// [`ChainStage::Tool`]: a force in N added between tissue and sensor, from velocity (m/s) and acceleration (m/s²) of
-    /// the needle's base.
-    fn tool_force(&self, _z_m: f64, _v_mps: f64, _a_mps2: f64) -> f64 {
+    /// [`ChainStage::Tool`]: a force in N added between tissue and sensor to the force `force_n` so far.
+    fn tool_force(&self, _base: &BaseMotion, _force_n: f64, _state: &mut EffectState) -> f64 {
         0.0
     }
 
@@ -262,11 +291,21 @@ mod tests {
     #[test]
     fn default_hooks_pass_values_through_and_add_no_force() {
         let (none, mut state) = (NoHooks, [0.25; 8]);
-        let tip = TipState { time_s: 1.0, dt_s: 0.1, z_m: 0.02, dz_m: 0.001, v_mps: 0.01, ruptured: 1 };
+        let tip = TipState {
+            time_s: 1.0,
+            dt_s: 0.1,
+            z_m: 0.02,
+            dz_m: 0.001,
+            v_mps: 0.01,
+            dv_mps: 0.0,
+            ruptured: 1,
+        };
+        let at = InsertionState { inside_m: 0.02, slabs: &[], elastic_n: 0.5, friction_n: 0.1 };
+        let base = BaseMotion { time_s: 1.0, dt_s: 0.1, z_m: 0.02, v_mps: 0.01, a_mps2: 2.0 };
         assert_eq!((none.id(), none.stage(), none.has_state()), ("cutting_force", ChainStage::Tip, false));
         assert_eq!(none.relative_motion(1.0, 0.02, 0.03), (0.02, 0.03));
         assert_eq!(none.elastic_force(50.0, 0.02, 0.7), 0.7);
-        assert_eq!(none.relax(0.1, 0.7, &mut state), 0.7);
+        assert_eq!(none.relax(&tip, 0.01, 0.7, &mut state), 0.7);
         assert_eq!(none.puncture_force(0.7, 0.01), 0.7);
         assert_eq!(none.puncture_force_after_load(1, 0.1, 0.3, 0.7, &mut state), 0.7);
         assert_eq!(none.relax_layer(1, 0.1, 0.7, &mut state), 0.7);
@@ -274,10 +313,10 @@ mod tests {
         assert_eq!(none.sensor_output(1.0, 0.1, 0.7, &mut state), 0.7);
         assert_eq!(none.mean_sensor_output(1.0, 0.1, 20.0, 0.7, &mut state), 0.7);
         assert_eq!((none.position_factor(), none.delay_s(), none.membrane_depth_m()), (1.0, 0.0, None));
-        assert_eq!((none.retained_force(0.7), none.tool_force(0.02, 0.01, 2.0)), (0.0, 0.0));
-        assert_eq!(none.shaft_force(&tip, 0.02, &mut state), 0.0);
+        assert_eq!((none.retained_force(0.7), none.tool_force(&base, 0.7, &mut state)), (0.0, 0.0));
+        assert_eq!(none.shaft_force(&tip, &at, &mut state), 0.0);
         assert_eq!(none.layer_friction(&tip, &[], 0.01, &mut state), 0.0);
-        assert_eq!(none.tip_force(&tip, &[], &mut state), 0.0);
+        assert_eq!(none.tip_force(&tip, &at, &mut state), 0.0);
         assert!(!none.ruptures_membrane(0.02, &[], &mut state));
         assert_eq!(state, [0.25; 8]);
     }

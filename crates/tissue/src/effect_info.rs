@@ -1,6 +1,7 @@
 //! Description of each effect, for listing (`stylet effects`), validation and fitting.
 
 use crate::chain_stage::ChainStage;
+use crate::custom_equation::CustomDefinition;
 
 /// Description of one effect of the library.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,11 +31,14 @@ pub struct EffectInfo {
     /// Whether it belongs to the sensor's baseline: a force in air too, of any size and sign, that does not depend on the
     /// tissue. Such effects are searched for before all others.
     pub baseline: bool,
+    /// The definition of an effect that is not in the library.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub custom: Option<&'static CustomDefinition>,
 }
 
 impl EffectInfo {
     /// Fields that most entries share: a per-layer effect without an extended form.
-    pub(crate) const DEFAULTS: Self = Self {
+    pub const DEFAULTS: Self = Self {
         id: "",
         equation: "",
         source: "",
@@ -46,6 +50,7 @@ impl EffectInfo {
         nested_in: &[],
         absorbs_unmodelled: false,
         baseline: false,
+        custom: None,
     };
 
     /// The parameter of this path, including further terms of the extended form.
@@ -143,7 +148,8 @@ impl ParameterInfo {
     }
 
     /// A strength.
-    pub(crate) const fn strength(path: &'static str, unit: &'static str, meaning: &'static str) -> Self {
+    #[must_use]
+    pub const fn strength(path: &'static str, unit: &'static str, meaning: &'static str) -> Self {
         Self {
             path,
             unit,
@@ -164,52 +170,62 @@ impl ParameterInfo {
     }
 
     /// A shape parameter.
-    pub(crate) const fn shape(path: &'static str, unit: &'static str, meaning: &'static str) -> Self {
+    #[must_use]
+    pub const fn shape(path: &'static str, unit: &'static str, meaning: &'static str) -> Self {
         Self { strength: false, ..Self::strength(path, unit, meaning) }
     }
 
     /// Physical range, both ends included.
-    pub(crate) const fn allowed(self, low: f64, high: f64) -> Self {
+    #[must_use]
+    pub const fn allowed(self, low: f64, high: f64) -> Self {
         Self { low, high, ..self }
     }
 
     /// Inactive value.
-    pub(crate) const fn inactive(self, value: f64) -> Self {
+    #[must_use]
+    pub const fn inactive(self, value: f64) -> Self {
         Self { inactive: value, ..self }
     }
 
     /// Typical value and search range.
-    pub(crate) const fn search(self, start: f64, low: f64, high: f64) -> Self {
+    #[must_use]
+    pub const fn search(self, start: f64, low: f64, high: f64) -> Self {
         Self { start, search: (low, high), ..self }
     }
 
     /// Value for the reference insertion.
-    pub(crate) const fn demonstration(self, value: f64) -> Self {
+    #[must_use]
+    pub const fn demonstration(self, value: f64) -> Self {
         Self { demonstration: Some(value), ..self }
     }
 
     /// Logarithmic search.
-    pub(crate) const fn log(self) -> Self {
+    #[must_use]
+    pub const fn log(self) -> Self {
         Self { log: true, ..self }
     }
 
     /// Differs between recordings, with this standard deviation.
-    pub(crate) const fn between_recordings_sd(self, sd: f64) -> Self {
+    #[must_use]
+    pub const fn between_recordings_sd(self, sd: f64) -> Self {
         Self { between_recordings_sd: sd, ..self }
     }
 
     /// Normal prior with this mean and standard deviation.
-    pub(crate) const fn measured_prior(self, mean: f64, sd: f64) -> Self {
+    #[must_use]
+    pub const fn measured_prior(self, mean: f64, sd: f64) -> Self {
         Self { measured_prior: Some((mean, sd)), ..self }
     }
 
     /// The frequency of a clock of its own.
-    pub(crate) const fn clock(self) -> Self {
+    #[must_use]
+    pub const fn clock(self) -> Self {
         Self { clock: true, ..self }
     }
 
     /// Integers only.
-    pub(crate) const fn integer(self) -> Self {
+    #[must_use]
+    pub const fn integer(self) -> Self {
         Self { integer: true, ..self }
     }
 }

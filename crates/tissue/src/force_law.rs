@@ -12,7 +12,7 @@
 //! may override it.
 
 use crate::chain_stage::ChainStage;
-use crate::effect::{Effect, EffectState, TipState};
+use crate::effect::{Effect, EffectState, InsertionState, TipState};
 use crate::effects::AnyEffect;
 use crate::force::{Rupture, TissueForce};
 use crate::force_law_state::{EffectStates, ForceLawState, MAX_EFFECTS};
@@ -328,8 +328,11 @@ impl ForceLaw {
     ) -> f64 {
         let mut done = 0.0; // fraction of the step before the latest rupture
         while let Some(slab) = self.slabs.get(state.ruptured) {
-            let elastic =
-                self.layer_elastic_force(state.ruptured, slab, (1.0 - done) * dt, z, &mut state.effects);
+            let tip = state.tip_state(state.time_s + dt, z, v);
+            // After a rupture only the rest of the step is left.
+            let travel = if done > 0.0 { 0.0 } else { 1.0 };
+            let tip = TipState { dt_s: (1.0 - done) * dt, dz_m: travel * tip.dz_m, ..tip };
+            let elastic = self.layer_elastic_force(slab, &tip, &mut state.effects);
             match self.try_rupture(state, slab, dt, (z, v), elastic, done, policy) {
                 None => return elastic,
                 Some(rupture) => {
@@ -342,16 +345,9 @@ impl ForceLaw {
 
     /// Elastic force of a layer after the elastic and relaxation effects.
     #[inline]
-    pub(crate) fn layer_elastic_force(
-        &self,
-        index: usize,
-        slab: &Slab,
-        dt: f64,
-        z: f64,
-        states: &mut EffectStates,
-    ) -> f64 {
-        let x = z - slab.front_m;
-        let x = slab.indentation_m(if x > 0.0 { x } else { 0.0 });
+    pub(crate) fn layer_elastic_force(&self, slab: &Slab, tip: &TipState, states: &mut EffectStates) -> f64 {
+        let depth = tip.z_m - slab.front_m;
+        let x = slab.indentation_m(if depth > 0.0 { depth } else { 0.0 });
         let mut elastic = slab.stiffness_n_per_m * x;
         if slab.is_curved() || !self.effects.is_empty() {
             for effect in self.effects_at(ChainStage::Elastic) {
@@ -359,10 +355,10 @@ impl ForceLaw {
             }
             elastic += slab.stiffness_n_per_m * x * slab.kappa_per_m * x + slab.curvature_n_per_m2 * x * x;
             for (effect, memory) in self.effects_with_state(ChainStage::Relaxation, states) {
-                elastic = effect.relax(dt, elastic, memory);
+                elastic = effect.relax(tip, depth, elastic, memory);
             }
             for (effect, memory) in self.effects_with_state(ChainStage::Friction, states) {
-                elastic = effect.relax_layer(index + 1, dt, elastic, memory);
+                elastic = effect.relax_layer(tip.ruptured + 1, tip.dt_s, elastic, memory);
             }
         }
         elastic
@@ -508,16 +504,19 @@ impl ForceLaw {
         let mut layer_n = 0.0;
         if self.force_may_jump {
             let mut factor = 1.0;
+            let mut at = InsertionState { inside_m: inside, slabs: &self.slabs, elastic_n, friction_n: 0.0 };
             for (effect, memory) in self.effects_with_state(ChainStage::Release, states) {
-                tip_extra_n += effect.tip_force(tip, &self.slabs, memory);
+                tip_extra_n += effect.tip_force(tip, &at, memory);
             }
             for (effect, memory) in self.effects_with_state(ChainStage::Friction, states) {
                 velocity = effect.friction_velocity(velocity);
                 factor *= effect.friction_factor(tip.v_mps);
-                dry_n += effect.shaft_force(tip, inside, memory);
+                at.friction_n = velocity * factor * (cumulative + local) + dry_n;
+                dry_n += effect.shaft_force(tip, &at, memory);
             }
+            at.friction_n = velocity * factor * (cumulative + local) + dry_n;
             for (effect, memory) in self.effects_with_state(ChainStage::Tip, states) {
-                tip_extra_n += effect.tip_force(tip, &self.slabs, memory);
+                tip_extra_n += effect.tip_force(tip, &at, memory);
             }
             for (effect, memory) in self.effects_with_state(ChainStage::Friction, states) {
                 layer_n += effect.layer_friction(tip, &self.slabs, velocity * factor, memory);

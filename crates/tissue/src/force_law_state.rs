@@ -89,6 +89,7 @@ impl ForceLawState {
             z_m,
             dz_m: z_m - self.z_m,
             v_mps,
+            dv_mps: v_mps - self.v_mps,
             ruptured: self.ruptured,
         }
     }

@@ -25,13 +25,19 @@
 extern crate alloc;
 
 mod chain_stage;
+mod compile_custom;
 mod compliant_needle;
+mod custom_equation;
+mod custom_names;
+mod custom_text;
+mod define_custom;
 pub mod effect;
 mod effect_info;
 mod effects;
 mod force;
 mod force_law;
 mod force_law_state;
+mod formula_equation;
 mod layer;
 mod layer_geometry;
 mod measurement_chain;
@@ -40,12 +46,17 @@ mod rupture_policy;
 mod shaft_friction;
 
 pub use chain_stage::ChainStage;
+pub use compile_custom::CustomError;
+pub use custom_equation::{CustomDefinition, Equation, EquationSample, MAX_PARAMETERS, MAX_STATES};
+pub use custom_text::{CustomText, NamedList, ParameterText, Place, Prior};
+pub use define_custom::known_effect_info;
 pub use effect::Effect;
 pub use effect_info::{EffectInfo, FitScale, ParameterError, ParameterInfo, Proposal};
 pub use effects::*;
 pub use force::{Rupture, TissueForce};
 pub use force_law::{ForceLaw, TooManyEffects};
 pub use force_law_state::{ForceLawState, MAX_EFFECTS};
+pub use formula_equation::{VARIABLES, Variable};
 pub use layer::{Layer, Tissue};
 pub use layer_geometry::Slab;
 pub use measurement_chain::{AveragingInterval, MeasurementChain, MeasurementState, SensorInput};

@@ -5,7 +5,7 @@
 //! the caller) -> saturation -> quantisation.
 
 use crate::chain_stage::ChainStage;
-use crate::effect::{Effect, EffectState};
+use crate::effect::{BaseMotion, Effect, EffectState};
 use crate::effects::AnyEffect;
 use alloc::vec::Vec;
 
@@ -24,6 +24,8 @@ pub struct MeasurementChain {
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeasurementState {
     time_s: Option<f64>,
+    /// One per effect of the tool; none when no such effect has a state.
+    tool: Vec<EffectState>,
     /// One per effect before the delay.
     effects: Vec<EffectState>,
     /// Delayed forces, (time, force), as a ring buffer.
@@ -66,6 +68,18 @@ pub struct AveragingInterval {
     pub acceleration_mps2: f64,
     /// Mean force of the tissue on the needle in N.
     pub tissue_n: f64,
+}
+
+impl AveragingInterval {
+    fn base_motion(&self) -> BaseMotion {
+        BaseMotion {
+            time_s: self.time_s,
+            dt_s: self.span_s,
+            z_m: self.position_m,
+            v_mps: self.velocity_mps,
+            a_mps2: self.acceleration_mps2,
+        }
+    }
 }
 
 impl MeasurementChain {
@@ -113,6 +127,7 @@ impl MeasurementChain {
         };
         MeasurementState {
             time_s: None,
+            tool: alloc::vec![[0.0; 8]; if self.tool.iter().any(Effect::has_state) { self.tool.len() } else { 0 }],
             effects: alloc::vec![[0.0; 8]; self.before_delay.len()],
             ring: alloc::vec![(0.0, 0.0); length],
             oldest: 0,
@@ -125,10 +140,14 @@ impl MeasurementChain {
         let time_s = reading.time_s;
         let dt_s = (time_s - state.time_s.unwrap_or(time_s)).max(0.0);
         state.time_s = Some(time_s);
-        let mut force = reading.tissue_n;
-        for effect in &self.tool {
-            force += effect.tool_force(reading.position_m, reading.velocity_mps, reading.acceleration_mps2);
-        }
+        let base = BaseMotion {
+            time_s,
+            dt_s,
+            z_m: reading.position_m,
+            v_mps: reading.velocity_mps,
+            a_mps2: reading.acceleration_mps2,
+        };
+        let mut force = self.force_of_tool(&mut state.tool, &base, reading.tissue_n);
         for (effect, state_of_effect) in self.before_delay.iter().zip(&mut state.effects) {
             force = effect.sensor_output(time_s, dt_s, force, state_of_effect);
         }
@@ -148,6 +167,17 @@ impl MeasurementChain {
         force
     }
 
+    /// The force in N after the effects of the tool.
+    #[inline]
+    fn force_of_tool(&self, states: &mut [EffectState], base: &BaseMotion, tissue_n: f64) -> f64 {
+        let mut force = tissue_n;
+        let mut none = [0.0; 8];
+        for (k, effect) in self.tool.iter().enumerate() {
+            force += effect.tool_force(base, force, states.get_mut(k).unwrap_or(&mut none));
+        }
+        force
+    }
+
     /// Delay of the recorded force in s.
     #[must_use]
     pub fn delay_s(&self) -> f64 {
@@ -163,11 +193,7 @@ impl MeasurementChain {
     /// Mean recorded force in N over an interval, without delay, noise, saturation and quantisation. Intervals follow one
     /// another without gaps; a lag is integrated through them.
     pub fn mean_force(&self, state: &mut MeasurementState, interval: &AveragingInterval) -> f64 {
-        let mut force = interval.tissue_n;
-        for effect in &self.tool {
-            force +=
-                effect.tool_force(interval.position_m, interval.velocity_mps, interval.acceleration_mps2);
-        }
+        let mut force = self.force_of_tool(&mut state.tool, &interval.base_motion(), interval.tissue_n);
         for (effect, state_of_effect) in self.before_delay.iter().zip(&mut state.effects) {
             force = effect.mean_sensor_output(
                 interval.time_s,
@@ -193,11 +219,7 @@ impl MeasurementChain {
     /// Recorded force in N at the end `interval.time_s` of an interval with the means `interval`, where a mean over several samples
     /// does not represent them. The state is that of [`MeasurementChain::mean_force`].
     pub fn force_at_end(&self, state: &mut MeasurementState, interval: &AveragingInterval) -> f64 {
-        let mut force = interval.tissue_n;
-        for effect in &self.tool {
-            force +=
-                effect.tool_force(interval.position_m, interval.velocity_mps, interval.acceleration_mps2);
-        }
+        let mut force = self.force_of_tool(&mut state.tool, &interval.base_motion(), interval.tissue_n);
         for (effect, state_of_effect) in self.before_delay.iter().zip(&mut state.effects) {
             force = effect.sensor_output_at_end(interval.time_s, interval.span_s, force, state_of_effect);
         }

@@ -30,6 +30,9 @@ pub struct DiagnoseArgs {
     /// Recordings (CSV with header); different motions identify more than one. A data set names its own.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub data: Vec<PathBuf>,
+    /// Custom effects that are candidates, too: lists of `Custom(...)` (RON).
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub effects: Vec<PathBuf>,
     /// Column map: names and units of the logs' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
@@ -50,6 +53,7 @@ impl DiagnoseArgs {
     pub fn inputs(&self, scenario: &Path) -> DiagnosisInputs {
         DiagnosisInputs {
             scenario: scenario.to_owned(),
+            effects: self.effects.clone(),
             data: self.data.clone(),
             columns: self.columns.clone(),
             repair: self.repair,
@@ -144,6 +148,9 @@ pub struct CheckArgs {
     /// Recordings (CSV with header).
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     pub data: Vec<PathBuf>,
+    /// Custom effects that are candidates, too: lists of `Custom(...)` (RON).
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub effects: Vec<PathBuf>,
     /// Column map: names and units of the logs' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
@@ -189,6 +196,9 @@ pub struct IdentifiabilityArgs {
     /// Use motion and noise of these recordings (CSV with header) instead of a motion.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub data: Vec<PathBuf>,
+    /// Custom effects that are candidates, too: lists of `Custom(...)` (RON).
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub effects: Vec<PathBuf>,
     /// Column map: names and units of the logs' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
@@ -225,6 +235,9 @@ pub struct PlanArgs {
     /// With a scenario: recordings made so far (CSV with header).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub data: Vec<PathBuf>,
+    /// Custom effects that are candidates, too: lists of `Custom(...)` (RON).
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub effects: Vec<PathBuf>,
     /// Column map: names and units of the logs' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
@@ -245,8 +258,12 @@ pub struct PlanArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   stylet effects
-  stylet effects coulomb_friction")]
+  stylet effects coulomb_friction
+  stylet effects tip_rate_stiffening --effects effects/mine.ron")]
 pub struct EffectsArgs {
     /// Effect to describe, by its id [default: list all].
     pub name: Option<String>,
+    /// List or describe the custom effects of these files, too (RON).
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub effects: Vec<PathBuf>,
 }

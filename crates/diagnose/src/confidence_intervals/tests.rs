@@ -21,6 +21,7 @@ fn assumptions() -> Assumptions {
     Assumptions {
         tissue: Tissue { surface_m: 0.002, layers: vec![layer] },
         known_effects: Vec::new(),
+        further_effects: Vec::new(),
         tolerance: vec![0.3],
         thickness_tolerance: vec![0.1],
         surface_tolerance_m: 0.05,

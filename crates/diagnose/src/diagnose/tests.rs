@@ -4,7 +4,7 @@ use crate::test_fixtures::{search_result, search_stage};
 use stylet_identify::model::FreeParameters;
 use stylet_identify::noise::Noise;
 use stylet_record::sensor_artefacts::SensorArtefacts;
-use stylet_tissue::{Effect, ForceBias, ForceDrift};
+use stylet_tissue::{AnyEffect, Effect, ForceBias, ForceDrift};
 
 fn drift() -> AnyEffect {
     ForceDrift { rate_n_per_s: 0.02 }.into()

@@ -28,6 +28,7 @@ fn model(off: &[f64], effects: &[AnyEffect]) -> Model {
     let assumed = Assumptions {
         tissue: Tissue { surface_m: 0.003, layers },
         known_effects: Vec::new(),
+        further_effects: Vec::new(),
         tolerance: vec![0.3; off.len()],
         thickness_tolerance: vec![0.1; off.len()],
         surface_tolerance_m: 0.01,
@@ -316,6 +317,7 @@ fn search_with_shift(shift_m: f64, off: [f64; 3]) -> (Search, PreparedRecordings
     let assumed = Assumptions {
         tissue,
         known_effects: Vec::new(),
+        further_effects: Vec::new(),
         tolerance: vec![0.3; 3],
         thickness_tolerance: vec![0.1; 3],
         surface_tolerance_m: 0.002,

@@ -157,7 +157,7 @@ fn deviate(effect: &mut AnyEffect, path: &str, deviation: f64) {
     for (value, p) in values.iter_mut().zip(info.parameters).filter(|(_, p)| p.path == path && !p.integer) {
         *value = (*value + deviation).clamp(p.low, p.high);
     }
-    if let Some(changed) = AnyEffect::from_parameters(info.id, &values) {
+    if let Some(changed) = info.with_parameters(&values) {
         *effect = changed;
     }
 }

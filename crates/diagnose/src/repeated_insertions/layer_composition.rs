@@ -277,6 +277,7 @@ fn stack_models(assumed: &Tissue, alone: &[&Model], moved_m: f64) -> Option<Mode
     model.assumed = Arc::new(Assumptions {
         tissue: tissue.clone(),
         known_effects: Vec::new(),
+        further_effects: Vec::new(),
         tolerance: vec![first.assumed.tolerance.first().copied().unwrap_or(1.0); layers],
         thickness_tolerance: vec![0.0; layers],
         surface_tolerance_m: first.assumed.surface_tolerance_m,

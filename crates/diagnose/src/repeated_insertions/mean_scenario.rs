@@ -41,6 +41,7 @@ pub fn mean_scenario(
             .filter_map(EffectTerm::effect)
             .chain(instrument.correctable_effects())
             .collect(),
+        candidates: Vec::new(),
         motion: Motion::Program { start_m: start, segments },
         robot: Robot::Replay,
         sensor: Sensor::ForceTorque(ForceTorque {

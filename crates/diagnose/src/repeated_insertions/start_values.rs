@@ -152,6 +152,7 @@ fn weak_prior(tissue: Tissue) -> Assumptions {
     let layers = tissue.layers.len();
     Assumptions {
         known_effects: Vec::new(),
+        further_effects: Vec::new(),
         tolerance: vec![STIFFNESS_FACTOR; layers],
         thickness_tolerance: (0..layers)
             .map(|l| if l + 1 < layers { RELATIVE_THICKNESS_SD } else { 0.0 })

@@ -1,4 +1,4 @@
-use stylet_tissue::{AnyEffect, Tissue};
+use stylet_tissue::{AnyEffect, EffectInfo, Tissue, general_effects};
 
 /// Assumed tissue before any measurement, with tolerances that define priors and bounds.
 #[derive(Clone, Debug)]
@@ -7,6 +7,8 @@ pub struct Assumptions {
     pub tissue: Tissue,
     /// Effects that the assumed model already contains.
     pub known_effects: Vec<AnyEffect>,
+    /// Effects outside the library that are candidates, too.
+    pub further_effects: Vec<&'static EffectInfo>,
     /// Relative tolerance of stiffness, friction and puncture force, per layer.
     pub tolerance: Vec<f64>,
     /// Relative tolerance of the thickness, per layer.
@@ -29,6 +31,11 @@ impl Assumptions {
         out.tolerance.fill(Self::WEAK_TOLERANCE);
         out.thickness_tolerance.fill(Self::GUESSED_TOLERANCE);
         out
+    }
+
+    /// The effects that are searched for: those of the library, then the further ones.
+    pub fn candidates(&self) -> impl Iterator<Item = &'static EffectInfo> {
+        general_effects().chain(self.further_effects.iter().copied())
     }
 
     /// Whether no thickness is known: where a layer boundary is found then tells nothing about an effect that would move it.

@@ -19,7 +19,7 @@ impl EffectTerm {
     /// The effect in the form that the law takes; `None` when the values are invalid.
     #[must_use]
     pub fn effect(&self) -> Option<AnyEffect> {
-        AnyEffect::from_parameters(self.info.id, &self.values)
+        self.info.with_parameters(&self.values)
     }
 
     pub(super) fn coordinates(&self) -> Vec<f64> {

@@ -1,7 +1,7 @@
 //! Reading and writing parameter values.
 
 use super::{Model, ParameterRole as Role};
-use stylet_tissue::{AnyEffect, FitScale};
+use stylet_tissue::FitScale;
 
 impl Model {
     /// Value of a parameter, in recording `r` if it is per-recording.
@@ -68,7 +68,7 @@ impl Model {
                         }
                     }
                 };
-                if let Some(effect) = AnyEffect::from_coordinates(term.info.id, &at) {
+                if let Some(effect) = term.info.with_coordinates(&at) {
                     term.values = effect.parameters();
                 }
                 let values = term.values.clone();

@@ -27,6 +27,7 @@ fn assumptions() -> Assumptions {
             ],
         },
         known_effects: Vec::new(),
+        further_effects: Vec::new(),
         tolerance: vec![0.3, 0.99, 0.25],
         thickness_tolerance: vec![0.1, 0.6, 0.0],
         surface_tolerance_m: 0.0015,

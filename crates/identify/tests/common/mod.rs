@@ -12,6 +12,7 @@ pub fn one_layer(thickness_m: f64, (stiffness_n_per_m, friction_ns_per_m2): (f64
     Arc::new(Assumptions {
         tissue: Tissue { surface_m: 0.0, layers: vec![layer] },
         known_effects: Vec::new(),
+        further_effects: Vec::new(),
         tolerance: vec![0.3],
         thickness_tolerance: vec![0.1],
         surface_tolerance_m: 0.002,

@@ -10,6 +10,7 @@ SI units everywhere; names carry their unit. Research software, not a medical de
 from ._core import Enhanced, Enhancer, enhance
 from ._data import read_csv
 from ._diagnosis import Check, Diagnosis, check, diagnose, identify
+from ._effect import Effect
 from ._plan import Plan, plan
 from ._run import Run, Scenario, simulate
 from ._stylet import Output, StyletError, __version__
@@ -28,6 +29,7 @@ STATES = (
 __all__ = [
     "Check",
     "Diagnosis",
+    "Effect",
     "Enhanced",
     "Enhancer",
     "Output",

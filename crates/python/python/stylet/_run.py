@@ -21,6 +21,11 @@ class Scenario:
         """The scenario with every default written out."""
         return self._ron
 
+    def with_effects(self, effects=(), candidates=()) -> Scenario:
+        """The scenario with further effects, and with further effects that a diagnosis searches for (`Effect`)."""
+        added = _stylet.add_effects(self._ron, [e.json() for e in effects], [e.json() for e in candidates])
+        return Scenario(added)
+
     def __repr__(self) -> str:
         return self._ron
 

@@ -28,7 +28,7 @@ pub(crate) fn effect_label(id: &str) -> String {
 /// The strength parameters of an effect with their units.
 #[must_use]
 pub fn strength_parameters(effect: &str, values: &BTreeMap<String, f64>) -> String {
-    let known = |path: &str| stylet_tissue::effect_info(effect).and_then(|i| i.parameter(path));
+    let known = |path: &str| stylet_tissue::known_effect_info(effect).and_then(|i| i.parameter(path));
     let unit = |path: &str| known(path).map_or("", |p| p.unit);
     let one = |(path, x): (&String, &f64)| {
         format!("{path} = {} {}", significant(*x, 2), unit(path)).trim_end().to_owned()

@@ -4,12 +4,13 @@
 //! table in `docs/reference/model.md`. Defaults and example values are read from RON that the parser accepts. The test
 //! `tests/promises/reference_pages.rs` compares the files with these functions.
 
-use crate::load_ron::{parse, ron_options};
+use crate::load_ron::parse;
+use crate::ron_dialect::ron_options;
 use crate::ron_outline::RonOutline;
 use crate::scenario::Scenario;
 use serde::Deserialize;
 use std::fmt::Write;
-use stylet_tissue::{AnyEffect, EffectInfo, ParameterInfo, general_effects, per_layer_effects};
+use stylet_tissue::{EffectInfo, ParameterInfo, VARIABLES, general_effects, per_layer_effects};
 
 /// Fields that belong together, as in `sections.ron`.
 #[derive(Deserialize)]
@@ -134,9 +135,9 @@ fn all_effects() -> impl Iterator<Item = &'static EffectInfo> {
 
 /// A line for the `effects` list of a scenario, with typical parameters: `CoulombFriction(c_n_per_m: 6.0),`.
 #[must_use]
-pub fn effect_line(info: &EffectInfo) -> String {
+pub fn effect_line(info: &'static EffectInfo) -> String {
     let typical: Vec<f64> = info.parameters.iter().map(|p| p.demonstration.unwrap_or(p.start)).collect();
-    AnyEffect::from_parameters(info.id, &typical)
+    info.with_parameters(&typical)
         .and_then(|effect| ron_options().to_string(&effect).ok())
         .map(|text| text.replace(':', ": ").replace(',', ", ") + ",")
         .unwrap_or_default()
@@ -215,8 +216,25 @@ pub fn effects_page() -> String {
             info.source.trim_end_matches('.')
         );
     }
+    page += &custom_effects_section();
     page.truncate(page.trim_end().len());
     page + "\n"
+}
+
+/// The fields of custom effects, and the variables of their formulas.
+fn custom_effects_section() -> String {
+    let mut section = "## Custom effects\n\n\
+        `Custom(...)` is an effect given by formulas: [how to use it](../custom_effects.md).\n\n```ron\n\
+        Custom(name: \"ageing_friction\", place: Friction, force: \"c * sgn(v) * inserted * (1 + travel/l)\", parameters: {\n    \
+        c: (start: 3.0, unit: \"N/m\", inactive: 0.0),\n    \
+        l: (start: 0.02, prior: LogNormal(median: 0.02, factor: 3.0), unit: \"m\"),\n\
+        }),\n```\n\n| variable | unit | meaning | places |\n|---|---|---|---|\n"
+        .to_owned();
+    for v in &VARIABLES {
+        let places: Vec<String> = v.places.iter().map(|place| format!("`{place:?}`")).collect();
+        let _ = writeln!(section, "| `{}` | {} | {} | {} |", v.name, v.unit, v.meaning, places.join(", "));
+    }
+    section
 }
 
 #[cfg(test)]

@@ -273,6 +273,7 @@ fn scenario() -> impl Strategy<Value = Scenario> {
                     source,
                     tissue,
                     effects,
+                    candidates: Vec::new(),
                     motion,
                     robot,
                     sensor,

@@ -1,5 +1,5 @@
 use crate::chain_stage::ChainStage;
-use crate::effect::{Effect, EffectState, TipState, sgn};
+use crate::effect::{Effect, EffectState, InsertionState, TipState, sgn};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Dry friction along the shaft: `f_B += c sgn(v) sum l_i`.
@@ -37,7 +37,7 @@ impl Effect for CoulombFriction {
     fn is_inactive(&self) -> bool {
         self.c_n_per_m == 0.0
     }
-    fn shaft_force(&self, tip: &TipState, inside_m: f64, _state: &mut EffectState) -> f64 {
-        self.c_n_per_m * sgn(tip.v_mps) * inside_m
+    fn shaft_force(&self, tip: &TipState, at: &InsertionState, _state: &mut EffectState) -> f64 {
+        self.c_n_per_m * sgn(tip.v_mps) * at.inside_m
     }
 }

@@ -1,7 +1,6 @@
 use crate::chain_stage::ChainStage;
-use crate::effect::{Effect, EffectState, TipState, sgn};
+use crate::effect::{Effect, EffectState, InsertionState, TipState, sgn};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
-use crate::layer_geometry::Slab;
 
 /// Cutting force at the tip: `+ F_c` while advancing (`sgn v > 0`) with the tip inside a punctured layer, or inside
 /// any layer without a puncture force.
@@ -38,12 +37,12 @@ impl Effect for CuttingForce {
     fn is_inactive(&self) -> bool {
         self.force_n == 0.0
     }
-    fn tip_force(&self, tip: &TipState, slabs: &[Slab], _state: &mut EffectState) -> f64 {
+    fn tip_force(&self, tip: &TipState, at: &InsertionState, _state: &mut EffectState) -> f64 {
         if sgn(tip.v_mps) <= 0.0 {
             return 0.0;
         }
         let z = tip.z_m;
-        let cut = slabs.iter().enumerate().any(|(i, slab)| {
+        let cut = at.slabs.iter().enumerate().any(|(i, slab)| {
             z >= slab.front_m && z < slab.far_m() && (i < tip.ruptured || slab.puncture_n == f64::INFINITY)
         });
         if cut { self.force_n } else { 0.0 }

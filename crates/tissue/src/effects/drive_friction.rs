@@ -1,5 +1,5 @@
 use crate::chain_stage::ChainStage;
-use crate::effect::{Effect, sgn};
+use crate::effect::{BaseMotion, Effect, EffectState, sgn};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Dry friction of the drive in the measured force: `+ F_j sgn(v)`, in air too (virtual sensor).
@@ -36,7 +36,7 @@ impl Effect for DriveFriction {
     fn is_inactive(&self) -> bool {
         self.force_n == 0.0
     }
-    fn tool_force(&self, _z_m: f64, v_mps: f64, _a_mps2: f64) -> f64 {
-        self.force_n * sgn(v_mps)
+    fn tool_force(&self, base: &BaseMotion, _force_n: f64, _state: &mut EffectState) -> f64 {
+        self.force_n * sgn(base.v_mps)
     }
 }

@@ -1,6 +1,6 @@
 use super::parameters::Described;
 use crate::chain_stage::ChainStage;
-use crate::effect::{Effect, EffectState, TipState};
+use crate::effect::{Effect, EffectState, InsertionState, TipState};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 use crate::layer_geometry::Slab;
 
@@ -87,8 +87,8 @@ impl Effect for HiddenMembrane {
     fn membrane_depth_m(&self) -> Option<f64> {
         Some(self.depth_m + self.stretch_m())
     }
-    fn tip_force(&self, tip: &TipState, slabs: &[Slab], state: &mut EffectState) -> f64 {
-        if state[0] != 0.0 { 0.0 } else { self.force(tip.z_m, slabs) }
+    fn tip_force(&self, tip: &TipState, at: &InsertionState, state: &mut EffectState) -> f64 {
+        if state[0] != 0.0 { 0.0 } else { self.force(tip.z_m, at.slabs) }
     }
 }
 

@@ -1,7 +1,6 @@
 use crate::chain_stage::ChainStage;
-use crate::effect::{Effect, EffectState, SGN_DEAD_BAND_MPS, TipState};
+use crate::effect::{Effect, EffectState, InsertionState, SGN_DEAD_BAND_MPS, TipState};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
-use crate::layer_geometry::Slab;
 
 /// A rupture that releases a part of the elastic force: the share `rho` of `f_K` at rupture stays as a constant tip
 /// force until the next rupture or reversal.
@@ -46,7 +45,7 @@ impl Effect for IncompleteRelease {
     fn on_rupture(&self, released_n: f64, _z_m: f64, state: &mut EffectState) {
         state[0] = self.fraction * released_n;
     }
-    fn tip_force(&self, tip: &TipState, _slabs: &[Slab], state: &mut EffectState) -> f64 {
+    fn tip_force(&self, tip: &TipState, _at: &InsertionState, state: &mut EffectState) -> f64 {
         if tip.v_mps < -SGN_DEAD_BAND_MPS {
             state[0] = 0.0;
         }

@@ -1,5 +1,5 @@
 use crate::chain_stage::ChainStage;
-use crate::effect::{Effect, EffectState};
+use crate::effect::{Effect, EffectState, TipState};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Rate-independent hysteresis of the elastic force: unloading runs below loading,
@@ -60,7 +60,7 @@ impl Effect for LoadingHysteresis {
         true
     }
     /// State: `E` of the previous sample, `1 - xi`.
-    fn relax(&self, _dt_s: f64, elastic_n: f64, state: &mut EffectState) -> f64 {
+    fn relax(&self, _tip: &TipState, _depth_m: f64, elastic_n: f64, state: &mut EffectState) -> f64 {
         let change = elastic_n - state[0];
         // Distance from the branch of this direction: 0 on loading, 2 on unloading.
         let branch = if change < 0.0 { 2.0 } else { 0.0 };
@@ -78,6 +78,9 @@ mod tests {
     use super::*;
     use alloc::vec::Vec;
 
+    const REST: TipState =
+        TipState { time_s: 0.0, dt_s: 0.01, z_m: 0.0, dz_m: 0.0, v_mps: 0.0, dv_mps: 0.0, ruptured: 0 };
+
     /// Forces along a path of elastic forces, with steps of `step_n`.
     fn along(path: &[f64], step_n: f64) -> Vec<f64> {
         let effect = LoadingHysteresis { fraction: 0.4, reversal_n: 0.05 };
@@ -89,7 +92,7 @@ mod tests {
             let mut force = f64::NAN;
             for k in 1..=steps as i32 {
                 at = from + (to - from) * f64::from(k) / steps;
-                force = effect.relax(0.01, at, &mut state);
+                force = effect.relax(&REST, 0.0, at, &mut state);
             }
             ends.push(force);
         }

@@ -3,7 +3,7 @@
 //! [`AnyEffect`] is the closed list that scenarios can name. A new effect takes one file and two lines here: its module,
 //! and its place in the list below, which is the order of the measurement chain.
 
-use crate::effect::{Effect, EffectState, TipState};
+use crate::effect::{BaseMotion, Effect, EffectState, InsertionState, TipState};
 use crate::effect_info::{EffectInfo, ParameterError};
 use crate::layer_geometry::Slab;
 use alloc::vec::Vec;
@@ -16,6 +16,7 @@ mod parameters;
 mod asymmetric_friction;
 mod boundary_shift;
 mod coulomb_friction;
+mod custom;
 mod cutting_force;
 mod deep_indentation;
 mod delayed_puncture;
@@ -61,6 +62,8 @@ macro_rules! effects {
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         pub enum AnyEffect {
             $(#[doc = concat!("See [`", stringify!($name), "`].")] $name($name),)*
+            /// An effect that is not in the library, see [`Custom`].
+            Custom(Custom),
         }
 
         $(impl $name {
@@ -72,16 +75,20 @@ macro_rules! effects {
             fn from(effect: $name) -> Self { Self::$name(effect) }
         })*
 
+        impl From<Custom> for AnyEffect {
+            fn from(effect: Custom) -> Self { Self::Custom(effect) }
+        }
+
         /// The entries of all effects, in the order of the chain.
         const LIBRARY: &[fn() -> &'static EffectInfo] = &[$($name::entry),*];
 
         /// Order of the effects in the chain.
-        enum Rank { $($name),* }
+        enum Rank { $($name,)* Custom }
 
         impl AnyEffect {
-            /// Position in the chain among all effects of the library.
+            /// Position in the chain among all effects of the library; custom effects come last in their stage.
             pub(crate) fn rank(&self) -> usize {
-                match self { $(Self::$name(_) => Rank::$name as usize,)* }
+                match self { $(Self::$name(_) => Rank::$name as usize,)* Self::Custom(_) => Rank::Custom as usize }
             }
 
             /// The effect of this id with these parameters, in the order of
@@ -97,13 +104,13 @@ macro_rules! effects {
             /// The parameters, in the order of [`EffectInfo::parameters`].
             #[must_use]
             pub fn parameters(&self) -> Vec<f64> {
-                match self { $(Self::$name(effect) => effect.values(),)* }
+                match self { $(Self::$name(effect) => effect.values(),)* Self::Custom(effect) => effect.values().into() }
             }
 
             /// The parameters in coordinates for fitting: as many as parameters, in their order.
             #[must_use]
             pub fn coordinates(&self) -> Vec<f64> {
-                match self { $(Self::$name(effect) => effect.coordinates(),)* }
+                match self { $(Self::$name(effect) => effect.coordinates(),)* Self::Custom(effect) => effect.values().into() }
             }
 
             /// The effect of this id at these coordinates.
@@ -116,31 +123,31 @@ macro_rules! effects {
             }
 
             fn check_together(&self) -> Result<(), ParameterError> {
-                match self { $(Self::$name(effect) => effect.check_together(),)* }
+                match self { $(Self::$name(effect) => effect.check_together(),)* Self::Custom(_) => Ok(()) }
             }
         }
 
-        effects!(@delegate [$($name)*]
+        effects!(@delegate [$($name)* Custom]
             fn info() -> &'static EffectInfo;
             fn is_inactive() -> bool;
             fn has_state() -> bool;
             fn modify_layers(slabs: &mut [Slab]) -> ();
             fn relative_motion(time_s: f64, z_m: f64, v_mps: f64) -> (f64, f64);
             fn elastic_force(k_n_per_m: f64, x_m: f64, force_n: f64) -> f64;
-            fn relax(dt_s: f64, elastic_n: f64, state: &mut EffectState) -> f64;
+            fn relax(tip: &TipState, depth_m: f64, elastic_n: f64, state: &mut EffectState) -> f64;
             fn puncture_force(threshold_n: f64, v_mps: f64) -> f64;
             fn puncture_force_after_load(layer: usize, dt_s: f64, elastic_n: f64, threshold_n: f64, state: &mut EffectState) -> f64;
             fn retained_force(released_n: f64) -> f64;
             fn on_rupture(released_n: f64, z_m: f64, state: &mut EffectState) -> ();
             fn friction_velocity(v_mps: f64) -> f64;
             fn friction_factor(v_mps: f64) -> f64;
-            fn shaft_force(tip: &TipState, inside_m: f64, state: &mut EffectState) -> f64;
+            fn shaft_force(tip: &TipState, at: &InsertionState, state: &mut EffectState) -> f64;
             fn on_layer_rupture(layer: usize, released_n: f64, state: &mut EffectState) -> ();
             fn relax_layer(layer: usize, dt_s: f64, elastic_n: f64, state: &mut EffectState) -> f64;
             fn layer_friction(tip: &TipState, slabs: &[Slab], sliding_mps: f64, state: &mut EffectState) -> f64;
             fn ruptures_membrane(z_m: f64, slabs: &[Slab], state: &mut EffectState) -> bool;
-            fn tip_force(tip: &TipState, slabs: &[Slab], state: &mut EffectState) -> f64;
-            fn tool_force(z_m: f64, v_mps: f64, a_mps2: f64) -> f64;
+            fn tip_force(tip: &TipState, at: &InsertionState, state: &mut EffectState) -> f64;
+            fn tool_force(base: &BaseMotion, force_n: f64, state: &mut EffectState) -> f64;
             fn sensor_output(time_s: f64, dt_s: f64, force_n: f64, state: &mut EffectState) -> f64;
             fn mean_sensor_output(time_s: f64, span_s: f64, samples: f64, force_n: f64, state: &mut EffectState) -> f64;
             fn sensor_output_at_end(time_s: f64, span_s: f64, force_n: f64, state: &mut EffectState) -> f64;
@@ -172,6 +179,8 @@ macro_rules! effects {
         }
     };
 }
+
+pub use custom::Custom;
 
 effects! {
     boundary_shift::BoundaryShift,
@@ -226,6 +235,26 @@ impl AnyEffect {
             }
         }
         self.check_together()
+    }
+}
+
+impl EffectInfo {
+    /// The effect with these parameters; `None` for a wrong number of them.
+    #[must_use]
+    pub fn with_parameters(&'static self, values: &[f64]) -> Option<AnyEffect> {
+        match self.custom {
+            Some(_) => Custom::with_values(self, values).map(AnyEffect::Custom),
+            None => AnyEffect::from_parameters(self.id, values),
+        }
+    }
+
+    /// The effect at these coordinates for fitting; `None` for a wrong number of them.
+    #[must_use]
+    pub fn with_coordinates(&'static self, coordinates: &[f64]) -> Option<AnyEffect> {
+        match self.custom {
+            Some(_) => Custom::with_values(self, coordinates).map(AnyEffect::Custom),
+            None => AnyEffect::from_coordinates(self.id, coordinates),
+        }
     }
 }
 

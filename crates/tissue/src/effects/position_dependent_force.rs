@@ -1,5 +1,5 @@
 use crate::chain_stage::ChainStage;
-use crate::effect::Effect;
+use crate::effect::{BaseMotion, Effect, EffectState};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// A force between arm and sensor that is linear in position, in air too: `+ k (z - z_0)`.
@@ -52,7 +52,7 @@ impl Effect for PositionDependentForce {
     fn is_inactive(&self) -> bool {
         self.stiffness_n_per_m == 0.0
     }
-    fn tool_force(&self, z_m: f64, _v_mps: f64, _a_mps2: f64) -> f64 {
-        self.stiffness_n_per_m * (z_m - self.rest_m)
+    fn tool_force(&self, base: &BaseMotion, _force_n: f64, _state: &mut EffectState) -> f64 {
+        self.stiffness_n_per_m * (base.z_m - self.rest_m)
     }
 }

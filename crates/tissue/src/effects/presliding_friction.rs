@@ -1,5 +1,5 @@
 use crate::chain_stage::ChainStage;
-use crate::effect::{Effect, EffectState, TipState, sgn};
+use crate::effect::{Effect, EffectState, InsertionState, TipState, sgn};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Dry friction that builds up with travel (Dahl): `f_B += c xi sum l_i`, `xi' = (v/delta)(1 - xi sgn v)` while the
@@ -67,7 +67,8 @@ impl Effect for PreslidingFriction {
         true
     }
     /// State: `xi`.
-    fn shaft_force(&self, tip: &TipState, inside_m: f64, state: &mut EffectState) -> f64 {
+    fn shaft_force(&self, tip: &TipState, at: &InsertionState, state: &mut EffectState) -> f64 {
+        let inside_m = at.inside_m;
         if inside_m > 0.0 {
             // On entry only the travel inside the tissue counts.
             let dz = tip.dz_m.min(inside_m);

@@ -1,7 +1,6 @@
 use crate::chain_stage::ChainStage;
-use crate::effect::{Effect, EffectState, TipState};
+use crate::effect::{Effect, EffectState, InsertionState, TipState};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
-use crate::layer_geometry::Slab;
 
 /// A gradual release: the elastic force `R` released by a rupture at `z_r` is spread over the travel `w`, so that the
 /// tip keeps `R max(0, 1 - (deepest - z_r)/w)`.
@@ -55,7 +54,7 @@ impl Effect for SoftBoundary {
         state[1] = released_n + oldest;
         state[2] = z_m;
     }
-    fn tip_force(&self, tip: &TipState, _slabs: &[Slab], state: &mut EffectState) -> f64 {
+    fn tip_force(&self, tip: &TipState, _at: &InsertionState, state: &mut EffectState) -> f64 {
         if state[7] == 0.0 {
             return 0.0;
         }

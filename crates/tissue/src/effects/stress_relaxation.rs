@@ -1,6 +1,6 @@
 use super::parameters::Described;
 use crate::chain_stage::ChainStage;
-use crate::effect::{Effect, EffectState, lag_weights, same_step};
+use crate::effect::{Effect, EffectState, TipState, lag_weights, same_step};
 use crate::effect_info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
 use alloc::vec::Vec;
 
@@ -133,7 +133,8 @@ impl Effect for StressRelaxation {
         true
     }
     /// State: `q_1`, `q_2`, the previous `E`, the time step and its two weights per term.
-    fn relax(&self, dt_s: f64, elastic_n: f64, state: &mut EffectState) -> f64 {
+    fn relax(&self, tip: &TipState, _depth_m: f64, elastic_n: f64, state: &mut EffectState) -> f64 {
+        let dt_s = tip.dt_s;
         let [q1, q2, before, ..] = *state;
         state[2] = elastic_n;
         if dt_s <= 0.0 || (elastic_n == 0.0 && before == 0.0 && q1 == 0.0 && q2 == 0.0) {

@@ -1,6 +1,6 @@
 use super::parameters::Described;
 use crate::chain_stage::ChainStage;
-use crate::effect::{Effect, EffectState, TipState, sgn};
+use crate::effect::{Effect, EffectState, InsertionState, TipState, sgn};
 use crate::effect_info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
 
 /// Dry friction that is larger at low speed: `f_B += sgn(v) sum l_i (c + (c_s - c) exp(-(v/v_s)²))`, `c_s >= c`.
@@ -97,7 +97,8 @@ impl Effect for StribeckFriction {
     fn is_inactive(&self) -> bool {
         self.c_n_per_m == 0.0 && self.c_static_n_per_m == 0.0
     }
-    fn shaft_force(&self, tip: &TipState, inside_m: f64, _state: &mut EffectState) -> f64 {
+    fn shaft_force(&self, tip: &TipState, at: &InsertionState, _state: &mut EffectState) -> f64 {
+        let inside_m = at.inside_m;
         let sign = sgn(tip.v_mps);
         if sign == 0.0 || inside_m == 0.0 {
             return 0.0;

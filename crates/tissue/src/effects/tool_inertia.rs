@@ -1,5 +1,5 @@
 use crate::chain_stage::ChainStage;
-use crate::effect::Effect;
+use crate::effect::{BaseMotion, Effect, EffectState};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 
 /// Inertia of the tool in front of the sensor: `+ m a`.
@@ -36,7 +36,7 @@ impl Effect for ToolInertia {
     fn is_inactive(&self) -> bool {
         self.mass_kg == 0.0
     }
-    fn tool_force(&self, _z_m: f64, _v_mps: f64, a_mps2: f64) -> f64 {
-        self.mass_kg * a_mps2
+    fn tool_force(&self, base: &BaseMotion, _force_n: f64, _state: &mut EffectState) -> f64 {
+        self.mass_kg * base.a_mps2
     }
 }

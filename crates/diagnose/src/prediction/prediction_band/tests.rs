@@ -102,6 +102,7 @@ fn model() -> Model {
             layers: vec![layer(0.012, 120.0, Some(1.2)), layer(0.05, 200.0, None)],
         },
         known_effects: vec![CoulombFriction { c_n_per_m: 8.0 }.into()],
+        further_effects: Vec::new(),
         tolerance: vec![0.3; 2],
         thickness_tolerance: vec![0.1; 2],
         surface_tolerance_m: 0.01,

@@ -25,6 +25,7 @@ fn alone(surface_m: f64, k: f64, effects: &[AnyEffect]) -> Model {
     let belief = Assumptions {
         tissue: tissue(&["x"], surface_m, 0.05, k),
         known_effects: Vec::new(),
+        further_effects: Vec::new(),
         tolerance: vec![4.0],
         thickness_tolerance: vec![0.0],
         surface_tolerance_m: 2e-3,

@@ -26,6 +26,7 @@ fn model() -> Model {
     let belief = Assumptions {
         tissue: tissue(),
         known_effects: Vec::new(),
+        further_effects: Vec::new(),
         tolerance: vec![0.5; 2],
         thickness_tolerance: vec![0.1; 2],
         surface_tolerance_m: 0.01,

@@ -32,6 +32,7 @@ pub(crate) fn population() -> Population {
     let belief = Assumptions {
         tissue: tissue(),
         known_effects: Vec::new(),
+        further_effects: Vec::new(),
         tolerance: vec![0.3; 2],
         thickness_tolerance: vec![0.1; 2],
         surface_tolerance_m: 0.01,

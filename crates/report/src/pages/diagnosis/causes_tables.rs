@@ -21,7 +21,7 @@ pub(super) fn causes(d: &Diagnosis) -> Section {
     let mut text = String::from(BASE_LAW_EQUATIONS);
     let mut rows = Vec::new();
     for c in &d.causes {
-        let info = stylet_tissue::effect_info(&c.effect);
+        let info = stylet_tissue::known_effect_info(&c.effect);
         if let Some(info) = info {
             let _ = write!(text, "\n{}:\n    {}\n", c.effect, info.equation);
         }
@@ -162,7 +162,7 @@ pub(super) fn not_identifiable(d: &Diagnosis) -> Section {
         .not_identifiable
         .iter()
         .map(|id| {
-            let info = stylet_tissue::effect_info(id);
+            let info = stylet_tissue::known_effect_info(id);
             vec![
                 Cell::text(id.clone()),
                 Cell::text(info.map_or("", |i| i.equation)),

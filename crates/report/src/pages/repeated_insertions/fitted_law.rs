@@ -89,7 +89,7 @@ pub(super) fn extended_law(study: &SetDiagnosis) -> Section {
     let d = &study.diagnosis;
     let mut text = String::from(BASE_LAW_EQUATIONS);
     for c in &d.causes {
-        let Some(info) = stylet_tissue::effect_info(&c.effect) else { continue };
+        let Some(info) = stylet_tissue::known_effect_info(&c.effect) else { continue };
         let _ = writeln!(text, "\n{}:\n    {}", c.effect, info.equation);
         for (path, e) in &c.parameters {
             let _ = writeln!(

@@ -1,0 +1,28 @@
+//! Files of custom effects.
+
+use crate::input_error::InputError;
+use crate::load_ron::{parse, read_text};
+use crate::scenario::Scenario;
+use crate::validate_effects::candidate;
+use std::path::Path;
+use stylet_tissue::{AnyEffect, Effect};
+
+impl Scenario {
+    /// Adds the effects of a file to the candidates; one that is there already is kept once.
+    ///
+    /// # Errors
+    /// [`InputError`] when the file is wrong, or defines a candidate of the same name differently.
+    pub fn add_candidates(&mut self, file: &Path) -> Result<(), InputError> {
+        let name = file.display().to_string();
+        let text = read_text(file)?;
+        for (index, effect) in parse::<Vec<AnyEffect>>(&name, &text)?.into_iter().enumerate() {
+            if !self.candidates.iter().any(|known| known.info() == effect.info()) {
+                self.candidates.push(effect);
+                let last = self.candidates.len() - 1;
+                candidate(self, last, &format!("[{index}]"))
+                    .map_err(|problem| problem.in_file(&name, &text))?;
+            }
+        }
+        Ok(())
+    }
+}
