@@ -193,7 +193,7 @@ fn an_error_names_the_field_and_the_part_of_the_formula() {
         (of("c * inserted * force", &c, &[]), "force", Some((15, 20)), "not available at `Friction`"),
         (of("c * depth", &c, &[]), "force", Some((4, 9)), "`depth` is not known"),
         (of("c * inserted + friction", &c, &[]), "force", None, "must be zero where every strength"),
-        (of("0.5 * v0", &[("v0", shape(2.0, "N"))], &[]), "force", None, "must be zero"),
+        (of("0.5 * v0", &[("v0", shape(2.0, "N"))], &[]), "parameters", None, "no parameter is a strength"),
         (
             of("c * (inserted + q)", &c, &[("q", "dq/dt = v + q")]),
             "state.q",
