@@ -8,7 +8,8 @@ use std::path::Path;
 use support::{Scratch, root, stderr_text, stylet};
 
 /// Objects whose keys are names of parameters or numbers.
-const FREE_KEYS: [&str; 4] = ["parameters", "numbers", "typical", "smallest_detectable"];
+const FREE_KEYS: [&str; 6] =
+    ["parameters", "numbers", "typical", "smallest_detectable", "smallest", "hidden_below"];
 
 fn collect(value: &Value, keys: &mut BTreeSet<String>) {
     match value {

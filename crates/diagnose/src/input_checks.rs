@@ -275,13 +275,14 @@ pub(crate) fn clean_recordings(named: &[NamedRecording]) -> CleanRecordings {
     for e in named {
         let mut all = e.notes.clone();
         all.extend(non_finite_note(&e.recording));
-        for note in assess(&e.recording) {
+        let finite = drop_non_finite(&e.recording);
+        for note in assess(&finite) {
             if !all.contains(&note) {
                 all.push(note);
             }
         }
         notes.push(all);
-        recordings.push(drop_non_finite(&e.recording));
+        recordings.push(finite);
     }
     let borrowed: Vec<&Recording> = recordings.iter().collect();
     let raw = find_sensor_artefacts(&borrowed, &notes);

@@ -224,7 +224,7 @@ pub fn effects_page() -> String {
 /// The fields of custom effects, and the variables of their formulas.
 fn custom_effects_section() -> String {
     let mut section = "## Custom effects\n\n\
-        `Custom(...)` is an effect given by formulas: [how to use it](../custom_effects.md).\n\n```ron\n\
+        `Custom(...)` is an effect given by formulas: [how to use it](../how-to/custom_effects.md).\n\n```ron\n\
         Custom(name: \"ageing_friction\", place: Friction, force: \"c * sgn(v) * inserted * (1 + travel/l)\", parameters: {\n    \
         c: (start: 3.0, unit: \"N/m\", inactive: 0.0),\n    \
         l: (start: 0.02, prior: LogNormal(median: 0.02, factor: 3.0), unit: \"m\"),\n\
