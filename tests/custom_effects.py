@@ -164,15 +164,15 @@ def named(folder):
 
 
 def clean(folder):
-    of_ten, accused, custom, cases = customs(here / "ten.ron"), 0, 0, args.cases or 60
+    of_ten, named_any, custom, cases = customs(here / "ten.ron"), 0, 0, args.cases or 60
     for c in range(cases):
         found, _ = Case(folder, args.seed * 1000 + 700 + c, lambda rng: "").diagnose(here / "ten.ron")
         names = [e["effect"] for e in found["causes"]]
-        accused += bool(names)
+        named_any += bool(names)
         custom += any(name in of_ten for name in names)
         if names or args.verbose:
             print("  ", c, found["verdict"], names, flush=True)
-    print(f"clean, with ten formulas among the candidates: any effect is named in {rate(accused, cases)}, one of the ten in {rate(custom, cases)}")
+    print(f"clean, with ten formulas among the candidates: any effect is named in {rate(named_any, cases)}, one of the ten in {rate(custom, cases)}")
 
 
 with tempfile.TemporaryDirectory() as folder:

@@ -14,14 +14,14 @@ a pole of 0.9 in the others, with the same standard deviation.
 Only what both tools can express is drawn: the dry friction does not depend on depth (MuJoCo's `frictionloss`, Stylet's `drive_friction`), the
 needle never stands still (MuJoCo's friction sticks there, Stylet's is zero), no layer ruptures, and the surface is known.
 
-What each tool is told. Both get the recordings, the surface, and the same start: stiffness and friction wrong by up to a quarter,
+What each tool is given. Both get the recordings, the surface, and the same start: stiffness and friction wrong by up to a quarter,
 otherwise the values at which Stylet's own search starts. A gain scales all forces, so neither tool can find it without a known force: in
-cases with a gain both are told stiffness and friction (MuJoCo: frozen; Stylet: a tolerance of 0.1 %).
+cases with a gain both are given stiffness and friction (MuJoCo: frozen; Stylet: a tolerance of 0.1 %).
 
-- MuJoCo is told which parameters there are, and fits those and no others. It does not search for a structure, and nobody claims that it does.
+- MuJoCo is given the list of parameters, and fits those and no others. It does not search for a structure, and nobody claims that it does.
   A delay makes the sum of squares rough (the step of the dry friction passes from sample to sample), so that a fit from a start that is
   off can end in a local minimum. MuJoCo therefore also stands as "MuJoCo x3", the best of three starts of the delay.
-- Stylet is told the layer alone. That there are a mass, a dry friction and a delay, gain or bias, it has to find out. What it does not
+- Stylet is given the layer alone. That there are a mass, a dry friction and a delay, gain or bias, it has to find out. What it does not
   name counts as an estimate of nothing (zero; for a gain one) without an interval, and as an interval that misses.
 
 MuJoCo is used as its README says: `Parameter` with modifiers of the spec, `ModelSequences`, `SignalTransform` for delay, gain and bias,
@@ -385,7 +385,7 @@ def table(result):
 
     about, named, lines = result["about"], result["named"], []
     lines.append(f"mujoco {about['mujoco']} (mujoco.sysid) and {about['stylet']}: {about['cases']} cases of seed {about['seed']}")
-    lines.append("MuJoCo is told which parameters there are; Stylet is told the layer and finds the rest.")
+    lines.append("MuJoCo is given the list of parameters; Stylet is given the layer and finds the rest.")
     lines.append("MuJoCo x3: the best of three fits that start from delays of 30, 10 and 60 ms.")
     lines.append("")
     layout = "{:<11}{:<14}" + 3 * "{:>12}" + "   " + 3 * "{:<20}"

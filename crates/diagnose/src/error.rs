@@ -119,7 +119,7 @@ pub enum DiagnoseError {
     },
     /// The check of the recordings says that a diagnosis would mean nothing.
     #[error(
-        "a diagnosis of these recordings would mean nothing: {reasons}; look at `stylet check`, or add --force"
+        "a diagnosis of these recordings would mean nothing: {reasons}; look at `stylet check`; `stylet diagnose --force` goes on all the same"
     )]
     Unusable {
         /// What stands against it.

@@ -2,6 +2,7 @@
 
 use crate::page_model::{Cell, Page, Section, Status, Table};
 use crate::pages::formatting::{effect_label, strength_parameters};
+use std::collections::BTreeMap;
 use stylet_diagnose::check_json::{CheckItem, EffectVisibility, Light};
 use stylet_diagnose::claims::parameter_name;
 use stylet_diagnose::experiment_check::ExperimentCheck;
@@ -37,17 +38,22 @@ pub(crate) fn items_table(items: &[CheckItem]) -> Table {
     Table::new("What these recordings allow", &["aspect", "", "reason"], items.iter().map(row).collect())
 }
 
-/// The smallest size of each effect that would be seen, as a table.
+/// The sizes from which each effect would be seen and below which it would be missed, as a table.
 pub(crate) fn effects_table(effects: &[EffectVisibility]) -> Table {
+    let size = |e: &EffectVisibility, parameters: &Option<BTreeMap<String, f64>>, none: &str| {
+        parameters.as_ref().map_or_else(|| none.to_owned(), |s| strength_parameters(&e.effect, s))
+    };
     let row = |e: &EffectVisibility| {
-        let from = e.smallest.as_ref();
-        let from = from.map_or_else(|| "no plausible size".to_owned(), |s| strength_parameters(&e.effect, s));
         let status = if e.visible { Status::Plain } else { Status::Warn };
-        vec![Cell::text(effect_label(&e.effect)), Cell::text(from).status(status)]
+        vec![
+            Cell::text(effect_label(&e.effect)),
+            Cell::text(size(e, &e.smallest, "no plausible size")).status(status),
+            Cell::text(size(e, &e.hidden_below, "every plausible size")),
+        ]
     };
     Table::new(
-        "Smallest size of each effect that would be seen",
-        &["effect", "from"],
+        "Sizes of each effect that would be seen, and that would be missed",
+        &["effect", "seen from", "missed below"],
         effects.iter().map(row).collect(),
     )
 }
