@@ -12,15 +12,18 @@
 //! | [`scoring`] | which answers are right, and the table |
 //! | [`challenge_export`] | cases for others, and judging their answers |
 //! | [`examination_plan`], [`mod@run_cases`] | which cases, and running an engine on them |
+//! | [`online`] | benchmark of online puncture detection |
 #![forbid(unsafe_code)]
 
 pub mod cases;
 pub mod challenge_export;
 pub mod examination_plan;
+pub mod online;
 pub mod run_cases;
 pub mod scoring;
 pub mod simulator;
 pub mod success_rate;
+mod words;
 
 pub use cases::case_id::{CaseId, Hide, Severity, Size, World, Wrong};
 pub use cases::case_recordings::{Case, NamedFile, Question, make_case};

@@ -4,7 +4,7 @@
 use axum::body::Body;
 use axum::extract::{Request, State};
 use axum::http::header::{self, HeaderName, HeaderValue};
-use axum::http::{HeaderMap, StatusCode};
+use axum::http::{HeaderMap, StatusCode, Uri};
 use axum::middleware::{self, Next};
 use axum::response::Response;
 use axum::{Extension, Router};
@@ -157,7 +157,7 @@ async fn refuse(stream: TcpStream) -> io::Result<()> {
 
 /// Refuses what does not come from the page itself, and adds the headers of every answer.
 async fn guard(State(access): State<Arc<Access>>, request: Request, next: Next) -> Response {
-    let mut response = match refusal(&access, request.headers(), request.uri().path()) {
+    let mut response = match refusal(&access, request.headers(), request.uri()) {
         Some((status, why)) => plain(status, why),
         None => next.run(request).await,
     };
@@ -175,18 +175,20 @@ async fn guard(State(access): State<Arc<Access>>, request: Request, next: Next) 
     response
 }
 
-fn refusal(access: &Access, headers: &HeaderMap, path: &str) -> Option<(StatusCode, &'static str)> {
+fn refusal(access: &Access, headers: &HeaderMap, uri: &Uri) -> Option<(StatusCode, &'static str)> {
     let values = |name| headers.get_all(name).iter().map(|value| value.to_str().unwrap_or_default());
     let own = |host: &str| (access.own_host)(host);
     // Without a token, clients of HTTP/1.0 may read.
     let unnamed = access.token.is_some() && !headers.contains_key(header::HOST);
-    if unnamed || !values(header::HOST).all(own) {
+    // A request may name its host in its first line as well.
+    let in_address = uri.authority().map(|a| a.as_str());
+    if unnamed || !values(header::HOST).chain(in_address).all(own) {
         return Some((StatusCode::MISDIRECTED_REQUEST, "wrong Host: open the address that stylet printed"));
     }
     if !values(header::ORIGIN).all(|origin| origin.strip_prefix("http://").is_some_and(own)) {
         return Some((StatusCode::FORBIDDEN, "wrong Origin: only the page itself may send requests"));
     }
-    let given = path.trim_start_matches('/').split('/').next().unwrap_or_default();
+    let given = uri.path().trim_start_matches('/').split('/').next().unwrap_or_default();
     match &access.token {
         Some(token) if !equal_in_constant_time(given.as_bytes(), token.as_bytes()) => {
             Some((StatusCode::FORBIDDEN, "no access without the token in the address that stylet printed"))

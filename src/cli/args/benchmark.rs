@@ -1,5 +1,7 @@
 //! Arguments of `stylet benchmark`.
 
+use crate::cli::args::AlgorithmArg;
+use crate::cli::output_args::OutputArgs;
 use crate::cli::resource_limits::parse_threads;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
@@ -22,6 +24,10 @@ pub enum BenchmarkCommand {
     Export(BenchmarkExportArgs),
     /// Score answers to exported cases with the same table.
     Score(BenchmarkScoreArgs),
+    /// Give exported streams to an online detector, sample by sample, and keep its answers.
+    Replay(BenchmarkReplayArgs),
+    /// Judge answers of online detectors to exported streams.
+    JudgeOnline(BenchmarkJudgeOnlineArgs),
     /// Plan and simulate a second insertion where the first leaves the cause open: how often is it then identified?
     Plan(BenchmarkPlanArgs),
 }
@@ -103,18 +109,85 @@ pub struct BenchmarkDiagnoseArgs {
 
 /// Arguments of `stylet benchmark export`.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:
+#[command(after_help = "Examples:
   stylet benchmark export --wrong thickness,encoder --severity large --cases 30 --seed 20261 --out out/challenge
+  stylet benchmark export --online --rows all --cases 100 --seed 20261 --out out/streams
+  stylet benchmark export --online --rows hand_held,hold --split make --cases 30 --out out/make
 
 Writes README.md (the task), names.txt (admissible names) and cases/NNNN with assumed.ron and the
 recordings as CSV. The key with the hidden effects goes to DIR.key.json next to the folder; keep it, and
-choose a seed that nobody would guess.")]
+choose a seed that nobody would guess.
+
+With --online: streams/NNNN.csv for online detection of punctures, their rates in streams.csv, and the key;
+for `--split make` also truth.csv. Streams of the two splits and of different seeds have nothing in common.")]
 pub struct BenchmarkExportArgs {
     #[command(flatten)]
     pub cases: CaseArgs,
+    /// Export streams for online detection of punctures instead of cases for the diagnosis.
+    #[arg(long, conflicts_with_all = ["misspecification", "severity", "hide", "size", "effect"])]
+    pub online: bool,
+    /// With --online: rows of the table, `all` for every one; an unknown word is answered by the list.
+    #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "all", requires = "online")]
+    pub rows: Vec<String>,
+    /// With --online: `make` for choosing a detector's settings, `judge` for judging it.
+    #[arg(long, value_name = "WORD", default_value = "judge", requires = "online")]
+    pub split: String,
     /// Folder for the challenge; it must not exist yet.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+}
+
+/// Arguments of `stylet benchmark replay`.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  stylet benchmark replay out/streams --out out/answers/mine -- python3 mine.py --window 0.1
+  stylet benchmark replay out/streams --out out/answers/stylet --algorithm Stylet
+
+The program is given `start RATE_HZ` at the beginning of a stream and then one line `TIME_S,POSITION_M,FORCE_N`
+per sample; it replies one line to each sample, `EVENT,DROP_N,CONFIDENCE,TIP_FORCE_N`, where fields may be
+empty or left out. So only causal detectors can play. The README.md of the streams has the details.
+
+Writes events.csv, entrant.json (name, time per sample) and enhanced/NNNN.csv where a tip force was given.")]
+pub struct BenchmarkReplayArgs {
+    /// Folder of the exported streams.
+    #[arg(value_name = "STREAMS")]
+    pub folder: PathBuf,
+    /// Folder for the answers; it must not exist yet.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Name in the table [default: name of the answers' folder].
+    #[arg(long, value_name = "NAME")]
+    pub name: Option<String>,
+    /// Play this algorithm of Stylet instead of a program.
+    #[arg(long, value_name = "NAME", conflicts_with = "program", required_unless_present = "program")]
+    pub algorithm: Option<AlgorithmArg>,
+    /// Streams replayed in parallel, each to a process of its own [default: number of cores].
+    #[arg(long, value_name = "N", value_parser = parse_threads)]
+    pub threads: Option<usize>,
+    /// Program and its arguments.
+    #[arg(last = true, value_name = "PROGRAM")]
+    pub program: Vec<String>,
+}
+
+/// Arguments of `stylet benchmark judge-online`.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:
+  stylet benchmark judge-online out/streams out/answers/* --out out/table
+
+Needs the key STREAMS.key.json. Prints F1 within 0.5 mm by row, and over all rows missed, false, delay and the
+recall at one false alarm per hour. Writes report.html and online.json.")]
+pub struct BenchmarkJudgeOnlineArgs {
+    /// Folder of the exported streams.
+    #[arg(value_name = "STREAMS")]
+    pub folder: PathBuf,
+    /// Folders of answers.
+    #[arg(value_name = "ANSWERS", required = true)]
+    pub answers: Vec<PathBuf>,
+    /// Also write the scores to this JSON file.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    #[command(flatten)]
+    pub results: OutputArgs,
 }
 
 /// Arguments of `stylet benchmark plan`.

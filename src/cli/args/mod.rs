@@ -11,8 +11,8 @@ mod studio;
 mod sweep;
 
 pub use benchmark::{
-    BenchmarkArgs, BenchmarkCommand, BenchmarkDiagnoseArgs, BenchmarkExportArgs, BenchmarkPlanArgs,
-    BenchmarkScoreArgs,
+    BenchmarkArgs, BenchmarkCommand, BenchmarkDiagnoseArgs, BenchmarkExportArgs, BenchmarkJudgeOnlineArgs,
+    BenchmarkPlanArgs, BenchmarkReplayArgs, BenchmarkScoreArgs,
 };
 pub use diagnosis::{
     CheckArgs, CompareModelsArgs, DiagnoseArgs, EffectsArgs, IdentifiabilityArgs, IdentifyArgs, PlanArgs,

@@ -10,6 +10,9 @@ use stylet_examine::{challenge_export, results_table};
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn export(args: &BenchmarkExportArgs) -> Result<(), Failure> {
+    if args.online {
+        return super::online::export(args);
+    }
     let plan = args.cases.selection().plan()?;
     let written = challenge_export::export(&plan, &args.out).map_err(|e| Failure::Check(e.to_string()))?;
     print(&format!(

@@ -1,7 +1,8 @@
-//! `stylet benchmark`: accuracy of diagnosis and planning over many simulated cases.
+//! `stylet benchmark`: accuracy of diagnosis, planning and online detection over many simulated cases.
 
 mod diagnose;
 mod export_and_score;
+mod online;
 mod plan;
 
 use crate::cli::args::{BenchmarkArgs, BenchmarkCommand};
@@ -16,6 +17,8 @@ pub fn benchmark(args: &BenchmarkArgs) -> Result<(), Failure> {
         BenchmarkCommand::Diagnose(args) => diagnose::diagnose(args),
         BenchmarkCommand::Export(args) => export_and_score::export(args),
         BenchmarkCommand::Score(args) => export_and_score::score(args),
+        BenchmarkCommand::Replay(args) => online::replay(args),
+        BenchmarkCommand::JudgeOnline(args) => online::judge(args),
         BenchmarkCommand::Plan(args) => plan::plan(args),
     }
 }

@@ -1,11 +1,13 @@
-//! Accuracy of diagnosis and planning on cases of the independent simulator.
+//! Accuracy of diagnosis, planning and online detection on cases of the independent simulator.
 
 mod answer_question;
 mod case_journal;
 mod diagnosis;
+mod online;
 mod planning;
 
 pub use diagnosis::{CaseSelection, DiagnosisBenchmark};
+pub use online::{Player, judge_online, online_files, online_streams, replay_streams};
 pub use planning::PlanningBenchmark;
 
 use crate::error::Error;

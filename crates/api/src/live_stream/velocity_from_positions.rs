@@ -10,13 +10,13 @@ const MAX_SAMPLES: usize = 512;
 
 /// Least-squares line through the latest positions.
 #[derive(Clone, Debug, Default)]
-pub(super) struct VelocityEstimator {
+pub(crate) struct VelocityEstimator {
     points: VecDeque<(f64, f64)>,
 }
 
 impl VelocityEstimator {
     /// Velocity in m/s at a new position (m); zero from fewer than two positions. The position counts from [`Self::add`] on.
-    pub(super) fn at(&self, time_s: f64, position_m: f64) -> f64 {
+    pub(crate) fn at(&self, time_s: f64, position_m: f64) -> f64 {
         if self.points.back().is_none_or(|(before, _)| time_s <= *before) {
             return 0.0;
         }
@@ -30,7 +30,7 @@ impl VelocityEstimator {
     }
 
     /// Takes a position that belongs to the motion.
-    pub(super) fn add(&mut self, time_s: f64, position_m: f64) {
+    pub(crate) fn add(&mut self, time_s: f64, position_m: f64) {
         if self.points.back().is_some_and(|(before, _)| time_s <= *before) {
             self.points.clear();
         }

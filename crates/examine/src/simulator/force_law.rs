@@ -24,4 +24,10 @@ pub trait ForceLaw {
 
     /// Instants (s) at which layers gave way so far, in the order of the layers.
     fn ruptures(&self) -> &[f64];
+
+    /// Elastic force in N that each of these ruptures released, at once or over some travel.
+    fn released_n(&self) -> &[f64];
+
+    /// Force on the tip in N: the force at the base without the friction along the shaft.
+    fn tip_n(&self) -> f64;
 }

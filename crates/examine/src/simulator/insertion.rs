@@ -17,8 +17,12 @@ pub struct Insertion {
     pub acceleration_mps2: Vec<f64>,
     /// Force that came through tool, gain, lag and delay in N.
     pub force_n: Vec<f64>,
+    /// Force on the tip in N, without sensor and tool.
+    pub tip_n: Vec<f64>,
     /// Instants in s at which layers gave way.
     pub ruptures_s: Vec<f64>,
+    /// Elastic force in N that each of them released.
+    pub released_n: Vec<f64>,
 }
 
 /// A force that no library knows, added at the needle's base.
@@ -91,7 +95,9 @@ pub fn simulate_insertion(
         out.velocity_mps.push(here.v);
         out.acceleration_mps2.push(here.a);
         out.force_n.push(line.read(t));
+        out.tip_n.push(law.tip_n());
     }
     out.ruptures_s = law.ruptures().to_vec();
+    out.released_n = law.released_n().to_vec();
     out
 }

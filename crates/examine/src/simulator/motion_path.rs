@@ -1,7 +1,7 @@
 //! Motions of the needle's base (docs/reference/model.md, section 3): pieces whose borders are known, so that the simulation can stop at
 //! each of them.
 
-use core::f64::consts::TAU;
+use core::f64::consts::{PI, TAU};
 
 /// Position, velocity and acceleration of the base at an instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -40,6 +40,20 @@ pub enum MotionPiece {
         /// Duration in s.
         duration_s: f64,
     },
+    /// From one speed (m/s) to another along half a cosine, with a ripple on it as in `Move`. Without a jump of the speed
+    /// where the ripple has whole periods.
+    Blend {
+        /// Speed at the beginning in m/s.
+        from_mps: f64,
+        /// Speed at the end in m/s.
+        to_mps: f64,
+        /// Amplitude of the ripple in m/s.
+        ripple_mps: f64,
+        /// Frequency of the ripple in Hz.
+        ripple_hz: f64,
+        /// Duration in s.
+        duration_s: f64,
+    },
 }
 
 impl MotionPiece {
@@ -51,7 +65,9 @@ impl MotionPiece {
 
     fn duration_s(&self) -> f64 {
         match *self {
-            MotionPiece::Move { duration_s, .. } | MotionPiece::Swing { duration_s, .. } => duration_s,
+            MotionPiece::Move { duration_s, .. }
+            | MotionPiece::Swing { duration_s, .. }
+            | MotionPiece::Blend { duration_s, .. } => duration_s,
         }
     }
 
@@ -78,6 +94,18 @@ impl MotionPiece {
                     z: amplitude_m * (1.0 - cos),
                     v: amplitude_m * w * sin,
                     a: amplitude_m * w * w * cos,
+                }
+            }
+            MotionPiece::Blend { from_mps, to_mps, ripple_mps, ripple_hz, duration_s } => {
+                let ripple = MotionPiece::Move { speed_mps: 0.0, ripple_mps, ripple_hz, duration_s }.at(t);
+                let half = 0.5 * (to_mps - from_mps);
+                let w = PI / duration_s;
+                let (sin, cos) = libm::sincos(w * t);
+                MotionState {
+                    t,
+                    z: from_mps * t + half * (t - sin / w) + ripple.z,
+                    v: from_mps + half * (1.0 - cos) + ripple.v,
+                    a: half * w * sin + ripple.a,
                 }
             }
         }
@@ -110,6 +138,19 @@ impl MotionPath {
     #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.starts.last().map_or(0.0, |s| s.0)
+    }
+
+    /// Position of the base in m at the end.
+    #[must_use]
+    pub fn end_m(&self) -> f64 {
+        self.starts.last().map_or(0.0, |s| s.1)
+    }
+
+    /// Position of the base in m at `t`.
+    #[must_use]
+    pub fn position_m(&self, t: f64) -> f64 {
+        let piece = self.starts.partition_point(|s| s.0 <= t).saturating_sub(1);
+        self.at(piece, t).z
     }
 
     /// Number of pieces.
@@ -154,9 +195,18 @@ mod tests {
                 MotionPiece::Move { speed_mps: 0.002, ripple_mps: 0.001, ripple_hz: 0.7, duration_s: 3.3 },
                 MotionPiece::constant(0.0, 1.0),
                 MotionPiece::Swing { amplitude_m: 0.01, frequency_hz: 0.05, duration_s: 12.0 },
+                MotionPiece::Blend {
+                    from_mps: 0.02,
+                    to_mps: -0.004,
+                    ripple_mps: 0.003,
+                    ripple_hz: 9.0,
+                    duration_s: 1.7,
+                },
                 MotionPiece::constant(-0.004, 2.0),
             ],
         );
+        let middle = path.piece_end_s(1) - 0.4;
+        assert_eq!(path.position_m(middle), path.at(1, middle).z);
         for piece in 0..path.len() {
             let end = path.piece_end_s(piece);
             let gap = path.at(piece, end).z - path.at(piece + 1, end).z;

@@ -94,6 +94,7 @@ pub struct PlainWorld {
     with: Departures,
     now: Memory,
     ruptures: Vec<f64>,
+    released: Vec<f64>,
     /// Releases under way: force and position.
     soft: Vec<(f64, f64)>,
     /// Step for which the decays stand, and they.
@@ -157,6 +158,7 @@ impl PlainWorld {
             with,
             now: Memory::default(),
             ruptures: Vec::new(),
+            released: Vec::new(),
             soft: Vec::new(),
             decay: (-1.0, [1.0; 2]),
         }
@@ -395,6 +397,7 @@ impl PlainWorld {
             self.now.elastic = self.elastic(m.z);
             (self.now.unloaded, self.now.loading_n) = (0.0, self.now.elastic);
             self.now.active_n = self.now.elastic;
+            self.released.push(m.active_n - kept - self.now.active_n);
         }
         self.now.before = None;
         if self.with.spring.is_none() {
@@ -464,5 +467,14 @@ impl ForceLaw for PlainWorld {
 
     fn ruptures(&self) -> &[f64] {
         &self.ruptures
+    }
+
+    fn released_n(&self) -> &[f64] {
+        &self.released
+    }
+
+    fn tip_n(&self) -> f64 {
+        // No length of needle inside: no friction.
+        self.total(&self.now, 0.0, 0.0)
     }
 }

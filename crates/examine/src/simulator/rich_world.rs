@@ -239,6 +239,7 @@ pub struct RichWorld {
     shaft: Shaft,
     now: Memory,
     ruptures: Vec<f64>,
+    released: Vec<f64>,
     /// Ruptures under way: force released and position.
     torn: VecDeque<(f64, f64)>,
 }
@@ -263,6 +264,7 @@ impl RichWorld {
             shaft: Shaft::new(tissue),
             now: Memory::default(),
             ruptures: Vec::new(),
+            released: Vec::new(),
             torn: VecDeque::new(),
         }
     }
@@ -401,6 +403,7 @@ impl RichWorld {
             // What the next layer says at this place.
             self.now.active_n = 0.0;
             self.now = self.part(0.0, 0.0, m.base, m.v);
+            self.released.push(m.active_n - self.now.active_n);
         }
         self.sum_up();
     }
@@ -460,5 +463,13 @@ impl ForceLaw for RichWorld {
 
     fn ruptures(&self) -> &[f64] {
         &self.ruptures
+    }
+
+    fn released_n(&self) -> &[f64] {
+        &self.released
+    }
+
+    fn tip_n(&self) -> f64 {
+        self.now.tip_n
     }
 }

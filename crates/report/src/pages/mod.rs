@@ -13,6 +13,7 @@ pub mod identifiability;
 pub mod indented_specimens;
 pub mod inspection;
 pub mod model_consistency;
+pub mod online_benchmark;
 pub mod prediction;
 pub mod repeated_insertions;
 pub mod sweep;

@@ -1,0 +1,305 @@
+//! Streams in a folder: `streams/NNNN.csv` and `streams.csv` with their rates, the truth in a key next to the folder; and the answers to
+//! them.
+
+use super::event_matching::Event;
+use super::simulate_stream::{Stream, simulate_stream};
+use super::stream_id::{Split, StreamId};
+use super::stream_scores::EntrantAnswers;
+use crate::challenge_export::{ChallengeError, key_path};
+use core::fmt::Write as _;
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Version of the generator of streams: under another number the same name may stand for another stream.
+const STREAM_VERSION: u32 = 1;
+
+/// The stream behind each number.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct StreamKey {
+    stream_version: u32,
+    streams: BTreeMap<String, StreamId>,
+}
+
+/// Numbers in the answers of a detector, apart from its events.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct EntrantFile {
+    /// Name of the detector.
+    pub name: String,
+    /// Time per sample, with the way through the pipe, in ns.
+    pub ns_per_sample: Option<f64>,
+}
+
+/// One stream as exported.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExportedStream {
+    /// Its number.
+    pub number: String,
+    /// Nominal rate in Hz.
+    pub rate_hz: f64,
+}
+
+fn file_error(path: &Path) -> impl Fn(std::io::Error) -> ChallengeError {
+    let path = path.display().to_string();
+    move |why| ChallengeError::File { path: path.clone(), why }
+}
+
+fn content_error(path: &Path, why: impl Into<String>) -> ChallengeError {
+    ChallengeError::Content { path: path.display().to_string(), why: why.into() }
+}
+
+/// Writes streams in random order into a new folder, and their key next to it.
+///
+/// # Errors
+/// [`ChallengeError`]; nothing half-written stays.
+pub fn export_streams(ids: &[StreamId], folder: &Path) -> Result<usize, ChallengeError> {
+    if folder.exists() {
+        return Err(ChallengeError::There(folder.display().to_string()));
+    }
+    let mut part = folder.as_os_str().to_owned();
+    part.push(".part");
+    let part = std::path::PathBuf::from(part);
+    let _ = std::fs::remove_dir_all(&part);
+    let result = write_folder(ids, &part, folder);
+    if result.is_err() {
+        let _ = std::fs::remove_dir_all(&part);
+    }
+    result.map(|()| ids.len())
+}
+
+fn write_folder(ids: &[StreamId], part: &Path, folder: &Path) -> Result<(), ChallengeError> {
+    let mut ids = ids.to_vec();
+    let mut rng = ChaCha8Rng::seed_from_u64(ids.first().map_or(0, StreamId::stream_seed));
+    for k in (1..ids.len()).rev() {
+        ids.swap(k, rng.random_range(0..=k));
+    }
+    let streams = part.join("streams");
+    std::fs::create_dir_all(&streams).map_err(file_error(&streams))?;
+    let numbered: Vec<(String, StreamId)> =
+        ids.into_iter().enumerate().map(|(k, id)| (format!("{:04}", k + 1), id)).collect();
+    let lines: Vec<(String, String)> = numbered
+        .par_iter()
+        .map(|(number, id)| {
+            let stream = simulate_stream(id);
+            let path = streams.join(format!("{number}.csv"));
+            let mut text = String::from("time_s,position_m,force_n\n");
+            for ((t, z), f) in stream.time_s.iter().zip(&stream.position_m).zip(&stream.force_n) {
+                let _ = writeln!(text, "{t:.6},{z:.6},{f:.6}");
+            }
+            std::fs::write(&path, text).map_err(file_error(&path))?;
+            let truth = stream.punctures.iter().fold(String::new(), |mut out, p| {
+                let _ = writeln!(out, "{number},{:.6},{:.6},{:.4}", p.time_s, p.position_m, p.drop_n);
+                out
+            });
+            Ok((format!("{number},{:?}\n", stream.rate_hz), truth))
+        })
+        .collect::<Result<_, ChallengeError>>()?;
+    let list: String = lines.iter().map(|l| l.0.as_str()).collect();
+    let write = |name: &str, text: String| {
+        let path = part.join(name);
+        std::fs::write(&path, text).map_err(file_error(&path))
+    };
+    write("streams.csv", format!("stream,rate_hz\n{list}"))?;
+    write("README.md", readme(numbered.len()))?;
+    if numbered.iter().all(|(_, id)| id.split == Split::Make) {
+        let truth: String = lines.iter().map(|l| l.1.as_str()).collect();
+        write("truth.csv", format!("stream,time_s,position_m,drop_n\n{truth}"))?;
+    }
+    let key = StreamKey { stream_version: STREAM_VERSION, streams: numbered.into_iter().collect() };
+    let key_file = key_path(folder);
+    let text = serde_json::to_vec_pretty(&key).map_err(|e| file_error(&key_file)(e.into()))?;
+    std::fs::write(&key_file, text).map_err(file_error(&key_file))?;
+    std::fs::rename(part, folder).map_err(file_error(folder))
+}
+
+fn readme(count: usize) -> String {
+    format!(
+        "# When does the needle puncture a layer?
+
+{count} streams, `streams/NNNN.csv`: `time_s,position_m,force_n` of a needle pushed through layered tissue (SI units; position positive
+into the tissue, force at the needle's base, positive when it resists). `streams.csv` has the rate of each. In the tissue the force rises
+with depth; when a layer is punctured its elastic part is released, while friction along the needle stays. Nothing else is known: not the
+position of the surface, not the number of layers.
+
+Report each puncture as soon as you can, at the sample at which you know it. Only causal detectors count:
+
+    stylet benchmark replay FOLDER --out answers/mine -- python3 mine.py
+
+starts your program and gives it the streams sample by sample:
+
+    to you     start 200                    a new stream, rate in Hz; forget the previous one; no reply
+               0.005,-0.0061,0.0123         time_s,position_m,force_n; reply one line at once
+    from you   event,drop_n,confidence,tip_force_n
+
+`event` is 1 when a puncture is reported at this sample. The other fields are optional numbers: size of the drop, confidence (larger is
+surer; a threshold on it is swept), force on the tip. Fields may be empty and trailing ones left out: an empty line says nothing.
+
+A detector that does not run in a pipe may write `answers/mine/events.csv` itself, `stream,time_s,drop_n,confidence`, and optionally
+`answers/mine/enhanced/NNNN.csv`, `time_s,tip_force_n`.
+
+Judged with `stylet benchmark judge-online FOLDER answers/*` by whoever has the key: F1 with an event within 50 ms of the puncture, and
+before the needle has moved by 0.5 mm; missed and false ones, an event counting from 50 ms before to 1 s after a puncture; delay; false
+alarms per hour. A layer may tear in steps: the first event counts, and further ones while it still tears are no false alarms.
+"
+    )
+}
+
+/// The streams of a folder, from its `streams.csv`.
+///
+/// # Errors
+/// [`ChallengeError`]: the file, and what it should hold.
+pub fn exported_streams(folder: &Path) -> Result<Vec<ExportedStream>, ChallengeError> {
+    let path = folder.join("streams.csv");
+    let text = std::fs::read_to_string(&path).map_err(file_error(&path))?;
+    let mut lines = text.lines();
+    if lines.next() != Some("stream,rate_hz") {
+        return Err(content_error(
+            &path,
+            "line 1 should be `stream,rate_hz`, as `stylet benchmark export --online` writes it",
+        ));
+    }
+    lines
+        .enumerate()
+        .map(|(k, line)| {
+            let wrong = || {
+                content_error(&path, format!("line {}: it should be `NUMBER,RATE_HZ`, not `{line}`", k + 2))
+            };
+            let (number, rate) = line.split_once(',').ok_or_else(wrong)?;
+            let rate_hz = rate.parse().map_err(|_| wrong())?;
+            Ok(ExportedStream { number: number.to_owned(), rate_hz })
+        })
+        .collect()
+}
+
+/// The samples `[time_s, position_m, force_n]` of an exported stream.
+///
+/// # Errors
+/// [`ChallengeError`]: the file and the line.
+pub fn stream_samples(folder: &Path, number: &str) -> Result<Vec<[f64; 3]>, ChallengeError> {
+    let path = folder.join("streams").join(format!("{number}.csv"));
+    table(&path, "time_s,position_m,force_n")?
+        .into_iter()
+        .map(|(line, fields)| {
+            let number = |k: usize| fields.get(k).copied().flatten();
+            match (number(0), number(1), number(2)) {
+                (Some(t), Some(z), Some(f)) => Ok([t, z, f]),
+                _ => Err(content_error(&path, format!("line {line}: three numbers should be here"))),
+            }
+        })
+        .collect()
+}
+
+/// Lines of numbers, empty fields as `None`, with their line numbers.
+fn table(path: &Path, header: &str) -> Result<Vec<(usize, Vec<Option<f64>>)>, ChallengeError> {
+    let text = std::fs::read_to_string(path).map_err(file_error(path))?;
+    let names: Vec<&str> = text.lines().next().unwrap_or("").trim().split(',').collect();
+    let wanted: Vec<&str> = header.split(',').collect();
+    if names.is_empty() || !wanted.starts_with(&names) {
+        return Err(content_error(path, format!("line 1 should be `{header}`")));
+    }
+    text.lines()
+        .enumerate()
+        .skip(1)
+        .filter(|(_, line)| !line.trim().is_empty())
+        .map(|(k, line)| {
+            let fields = line
+                .trim()
+                .split(',')
+                .map(|field| match field.trim() {
+                    "" => Ok(None),
+                    field => field.parse().map(Some).map_err(|_| {
+                        content_error(
+                            path,
+                            format!("line {}: `{field}` is no number; the columns are `{header}`", k + 1),
+                        )
+                    }),
+                })
+                .collect::<Result<_, _>>()?;
+            Ok((k + 1, fields))
+        })
+        .collect()
+}
+
+/// The streams of a folder with their truth, from its key.
+///
+/// # Errors
+/// [`ChallengeError`].
+pub fn streams_with_truth(folder: &Path) -> Result<Vec<(String, Stream)>, ChallengeError> {
+    let path = key_path(folder);
+    let text = std::fs::read_to_string(&path).map_err(file_error(&path))?;
+    let key: StreamKey = serde_json::from_str(&text).map_err(|e| {
+        content_error(
+            &path,
+            format!(
+                "{e}; it should be the key that `stylet benchmark export --online` wrote next to the folder"
+            ),
+        )
+    })?;
+    if key.stream_version != STREAM_VERSION {
+        let why = format!(
+            "was made by version {} of the generator of streams, and this is version {STREAM_VERSION}: export the streams again",
+            key.stream_version
+        );
+        return Err(content_error(&path, why));
+    }
+    Ok(key.streams.into_par_iter().map(|(number, id)| (number, simulate_stream(&id))).collect())
+}
+
+/// Reads the answers in a folder: `events.csv`, and if there are any `entrant.json` and `enhanced/NNNN.csv`.
+///
+/// # Errors
+/// [`ChallengeError`]: the file and the line.
+pub fn read_answers(answers: &Path, streams: &[(String, Stream)]) -> Result<EntrantAnswers, ChallengeError> {
+    let described = answers.join("entrant.json");
+    let described: EntrantFile = match std::fs::read_to_string(&described) {
+        Ok(text) => serde_json::from_str(&text).map_err(|e| content_error(&described, e.to_string()))?,
+        Err(_) => EntrantFile::default(),
+    };
+    let name = if described.name.is_empty() {
+        answers.file_name().map_or_else(|| "entrant".to_owned(), |n| n.to_string_lossy().into_owned())
+    } else {
+        described.name
+    };
+    let path = answers.join("events.csv");
+    let mut events: BTreeMap<String, Vec<Event>> = BTreeMap::new();
+    for (line, fields) in table(&path, "stream,time_s,drop_n,confidence")? {
+        let field = |k: usize| fields.get(k).copied().flatten();
+        let (Some(number), Some(time_s)) = (field(0), field(1)) else {
+            return Err(content_error(&path, format!("line {line}: stream and time_s should be here")));
+        };
+        let number = format!("{number:04}");
+        if !streams.iter().any(|(n, _)| *n == number) {
+            return Err(content_error(&path, format!("line {line}: there is no stream {number}")));
+        }
+        events.entry(number).or_default().push(Event { time_s, drop_n: field(2), confidence: field(3) });
+    }
+    for list in events.values_mut() {
+        list.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    }
+    let enhancement = streams
+        .par_iter()
+        .filter_map(|(number, stream)| {
+            let path = answers.join("enhanced").join(format!("{number}.csv"));
+            path.exists().then(|| Ok((number.clone(), enhancement_error(&path, stream)?)))
+        })
+        .collect::<Result<_, ChallengeError>>()?;
+    Ok(EntrantAnswers { name, events, enhancement, ns_per_sample: described.ns_per_sample })
+}
+
+/// RMS error of the tip force in a file over the RMS of the true one, at the samples that it has.
+fn enhancement_error(path: &Path, stream: &Stream) -> Result<f64, ChallengeError> {
+    let (mut error, mut size) = (0.0, 0.0);
+    for (line, fields) in table(path, "time_s,tip_force_n")? {
+        let (Some(time_s), Some(tip_n)) = (fields[0], fields.get(1).copied().flatten()) else { continue };
+        let k = stream.time_s.partition_point(|t| *t < time_s - 1e-6);
+        let Some(true_n) = stream.tip_n.get(k) else {
+            return Err(content_error(path, format!("line {line}: the stream ends before this time")));
+        };
+        error += (tip_n - true_n) * (tip_n - true_n);
+        size += true_n * true_n;
+    }
+    Ok((error / size.max(f64::MIN_POSITIVE)).sqrt())
+}
