@@ -8,7 +8,7 @@
 4. Every ```sh block of the tutorials runs, in order, in a temporary folder per page, and prints the ```text block behind it.
 5. No misspelt word, where typos is installed.
 
-In a page, `<!-- file: NAME -->` in front of a code block saves it under that name; `<!-- not run: reason -->` in front of an ```sh block skips it, `<!-- exit code 2 -->` expects
+In a page, `<!-- file: NAME -->` in front of a code block saves it under that name; `<!-- file: NAME of PATH -->` also checks that it is this file; `<!-- not run: reason -->` in front of an ```sh block skips it, `<!-- exit code 2 -->` expects
 that exit code.
 In an expected output a line `...` stands for any lines, and `...` inside a line for any text. Python blocks of the tutorials run where `import stylet` works in $PYTHON (python3).
 """
@@ -203,6 +203,10 @@ def run_tutorials(binary):
             for marker, lang, code in blocks(page.read_text()):
                 if marker.startswith("file: "):
                     (work / marker[6:].split()[0]).write_text(code)
+                    if " of " in marker and code != (ROOT / marker.split(" of ")[1]).read_text():
+                        fault(f"{page.name}: {marker}: the block is not the file")
+                    if lang == "python":
+                        continue
                 if lang == "text":
                     missing = printed is not None and matches(code, printed)
                     if missing:

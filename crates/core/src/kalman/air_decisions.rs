@@ -130,7 +130,7 @@ impl KalmanEnhancer {
             self.baseline.settled = true;
             return;
         }
-        self.baseline.history.push(&Sample { force_n: self.baseline.measured_n, ..*sample });
+        self.baseline.history.push_doubtful(&Sample { force_n: self.baseline.measured_n, ..*sample });
         if self.baseline.history.samples < self.baseline.next_evaluation {
             return;
         }

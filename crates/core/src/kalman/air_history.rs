@@ -207,8 +207,17 @@ impl AirHistory {
         }
     }
 
-    /// Takes a sample.
+    /// Takes a sample in air.
     pub(super) fn push(&mut self, sample: &Sample) {
+        self.take(sample, true);
+    }
+
+    /// Takes a sample that may be one of the tissue, where the force changes more from sample to sample than the noise does.
+    pub(super) fn push_doubtful(&mut self, sample: &Sample) {
+        self.take(sample, false);
+    }
+
+    fn take(&mut self, sample: &Sample, is_air: bool) {
         if self.samples == 0.0 {
             self.origin = *sample;
         }
@@ -219,17 +228,19 @@ impl AirHistory {
             force_n: sample.force_n - self.origin.force_n,
         };
         let slot = self.samples as usize % LONG_LAG;
-        if self.samples >= LONG_LAG as f64 {
+        if is_air && self.samples >= LONG_LAG as f64 {
             self.difference(2, new.force_n - self.recent_n[slot]);
         }
         self.recent_n[slot] = new.force_n;
         self.samples += 1.0;
         let [older, mut last] = self.before;
-        if last.count > 0.0 {
+        if is_air && last.count > 0.0 {
             self.difference(0, new.force_n - last.force_n);
         }
         if older.count > 0.0 {
-            self.difference(1, new.force_n - older.force_n);
+            if is_air {
+                self.difference(1, new.force_n - older.force_n);
+            }
             let median = older.force_n.max(new.force_n).min(last.force_n.max(older.force_n.min(new.force_n)));
             let off = last.force_n - median;
             if off * off > SPIKE_SDS * SPIKE_SDS * 0.5 * self.differences[0].max(self.least_n2)

@@ -3,7 +3,7 @@
 //! Logged velocities are often smoothed or delayed: at a stop within one sample they decay over twenty, while friction, and
 //! with it the force, vanishes at once. The mean velocity `w` of a step, from the positions, has no lag but carries the
 //! encoder noise, `sqrt(2) sigma/dt`. The logged velocity is used as long as it agrees with `w` within four times their
-//! usual difference.
+//! usual difference, and within the step of the encoder, which is the smallest change of the travel from step to step.
 //!
 //! The second difference of `w` is free of smooth motion; encoder noise gives it the variance `20 sigma²/dt²`, so that a
 //! tenth of its mean square is the noise variance of `w`. `w` extrapolated by half a step is the velocity at the sample,
@@ -28,15 +28,23 @@ pub(crate) const REST_SPEED_MPS: f64 = 1e-5;
 const STEP_NOISE_RATIO: f64 = 0.1;
 const EXTRAPOLATED_NOISE_RATIO: f64 = 3.25;
 
+/// Smallest change of the travel from step to step that is no rounding error, in m, and the multiple of the encoder's step by which a
+/// travel may be off: half a step at either end, and some of the log.
+const MIN_ENCODER_STEP_M: f64 = 1e-12;
+const ENCODER_STEPS: f64 = 1.5;
+
 /// Consecutive samples that must agree before the log is used again.
 const AGREEING_SAMPLES: u8 = 2;
 
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct VelocityEstimator {
     /// Mean square of the usual difference, and its part from position noise, in (m/s)².
     usual: f64,
     noise: f64,
     logged_mps: f64,
+    /// Travel of the last step in m, and its smallest change so far: the step of the encoder, if it has one.
+    moved_m: f64,
+    encoder_step_m: f64,
     /// Mean velocities of the last three steps in m/s, newest first, and whether they have jumped.
     step_mps: [f64; 3],
     jumped: bool,
@@ -48,6 +56,24 @@ pub(crate) struct VelocityEstimator {
     /// The positions are accurate; the log is smoothed.
     accurate_positions: bool,
     smoothed_log: bool,
+}
+
+impl Default for VelocityEstimator {
+    fn default() -> Self {
+        Self {
+            usual: 0.0,
+            noise: 0.0,
+            logged_mps: 0.0,
+            moved_m: 0.0,
+            encoder_step_m: f64::INFINITY,
+            step_mps: [0.0; 3],
+            jumped: false,
+            standing: false,
+            disagreeing: 0,
+            accurate_positions: false,
+            smoothed_log: false,
+        }
+    }
 }
 
 impl VelocityEstimator {
@@ -65,6 +91,10 @@ impl VelocityEstimator {
         let dt_s = sample.time_s - last.time_s;
         let moved_m = sample.position_m - last.position_m;
         let before = core::mem::replace(&mut self.logged_mps, logged);
+        let change_m = (moved_m - core::mem::replace(&mut self.moved_m, moved_m)).abs();
+        if change_m > MIN_ENCODER_STEP_M && change_m < self.encoder_step_m {
+            self.encoder_step_m = change_m;
+        }
         if moved_m == 0.0 && (self.standing || logged.abs() <= REST_SPEED_MPS) {
             // A velocity smoothed forward and backward in time rises before the needle moves.
             self.smoothed_log |= before.abs() > REST_SPEED_MPS && logged.abs() > REST_SPEED_MPS;
@@ -82,7 +112,12 @@ impl VelocityEstimator {
         }
         let difference = step - 0.5 * (logged + before);
         let min_variance = MIN_SD_FRACTION * speed_mps * (MIN_SD_FRACTION * speed_mps);
-        let limit = DISAGREEMENT_SDS_SQUARED * at_least(min_variance, self.usual);
+        let resolution_mps =
+            if self.encoder_step_m.is_finite() { ENCODER_STEPS * self.encoder_step_m / dt_s } else { 0.0 };
+        let limit = at_least(
+            resolution_mps * resolution_mps,
+            DISAGREEMENT_SDS_SQUARED * at_least(min_variance, self.usual),
+        );
         if difference != 0.0 || logged != 0.0 {
             self.usual += gain * (at_most(limit, difference * difference) - self.usual);
         }
