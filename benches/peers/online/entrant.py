@@ -3,7 +3,8 @@
 A detector is a class made anew for every stream as `Detector(rate, **options)`. Its method `sample(force)` returns None or, when it
 reports a puncture, (drop in N or None, confidence). `serve(Detector, option=default, ...)` does the rest:
 
-- an event is passed on only while the needle advances: what a detector sees in holds and retractions is no puncture;
+- an event is passed on only while the needle advances, with at least a quarter of its mean speed of the last 0.3 s: what a detector sees in
+  holds and retractions, or while the friction goes because the needle stops, is no puncture;
 - after a gap in the samples the detector is made anew;
 - a sample without a force (nan) is left out.
 """
@@ -24,9 +25,9 @@ def serve(detector, **defaults):
         if line.startswith("start"):
             rate = float(line.split()[1])
             sample = detector(rate, **options).sample
-            gain = 1 - math.exp(-1 / (0.03 * rate))
+            gain, slow_gain = 1 - math.exp(-1 / (0.01 * rate)), 1 - math.exp(-1 / (0.3 * rate))
             gap = max(5 / rate, 0.02)
-            speed, last_time, last_position = 0.0, math.inf, 0.0
+            speed, usual, last_time, last_position = 0.0, 0.0, math.inf, 0.0
             continue
         time, position, force = map(float, line.split(","))
         reply = "\n"
@@ -36,9 +37,10 @@ def serve(detector, **defaults):
                 sample = detector(rate, **options).sample
             if elapsed > 0:
                 speed += gain * ((position - last_position) / elapsed - speed)
+                usual += slow_gain * (speed - usual)
             last_time, last_position = time, position
             event = sample(force)
-            if event is not None and speed > 1e-4:
+            if event is not None and speed > max(1e-4, usual / 4):
                 drop, confidence = event
                 reply = f"1,{'' if drop is None else format(drop, '.4f')},{confidence:.4f}\n"
         write(reply)

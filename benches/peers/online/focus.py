@@ -1,9 +1,10 @@
 """FOCuS (Romano, Eckley, Fearnhead, Rigaill 2023, J. Mach. Learn. Res. 24) by its authors' package changepoint-online.
 
-FOCuS is Page's CUSUM for all sizes of the change at once. It looks for a fall of the mean from zero in the residual of the force from its
-extrapolated straight line (see entrant.py).
+FOCuS is Page's CUSUM for all sizes of the change at once. It looks for a fall of the mean in the residual of the force from its extrapolated
+straight line (see entrant.py).
 
-Options: `trend` is the time constant of that line in s, `threshold` that of the log-likelihood ratio.
+Options: `trend` is the time constant of that line in s, `allowance` what a fall must exceed in noise standard deviations, so that the slow
+falls of a line that does not quite fit count for nothing, and `threshold` that of the log-likelihood ratio.
 """
 
 from changepoint_online import Focus, Gaussian
@@ -12,7 +13,8 @@ from entrant import OnResidual, serve
 
 
 class FocusDetector(OnResidual):
-    def __init__(self, rate, trend, threshold):
+    def __init__(self, rate, trend, allowance, threshold):
+        self.allowance = allowance
         self.longest = 2000  # samples, so that the package's sums do not grow for ever
         super().__init__(rate, trend, threshold)
 
@@ -21,7 +23,7 @@ class FocusDetector(OnResidual):
 
     def update(self, residual):
         self.seen += 1
-        self.focus.update(residual)
+        self.focus.update(residual + self.allowance)
         statistic = self.focus.ql.opt
         if self.seen > self.longest and statistic < 1:
             self.reset()
@@ -29,4 +31,4 @@ class FocusDetector(OnResidual):
 
 
 if __name__ == "__main__":
-    serve(FocusDetector, trend=0.1, threshold=15.0)
+    serve(FocusDetector, trend=0.03, allowance=1.0, threshold=15.0)

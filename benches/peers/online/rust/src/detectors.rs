@@ -6,13 +6,13 @@ use changepoint::rv::process::gaussian::kernel::{
 };
 use changepoint::{Argpcp, BocpdLike, BocpdTruncated};
 
-use crate::Options;
 use crate::residual::{Peak, Residual};
+use crate::Options;
 
 type Kernel = AddKernel<ProductKernel<ConstantKernel, RBFKernel>, WhiteKernel>;
 
 /// The crate's detectors begin anew after so many samples without a change, since the work per sample grows with the run.
-const LONGEST: usize = 1000;
+const LONGEST: usize = 300;
 const LONGEST_PROCESS: usize = 100;
 
 enum Detector {
@@ -50,6 +50,7 @@ pub struct Stream {
     time: f64,
     position: f64,
     speed: f64,
+    usual: f64,
     block: usize,
     sum: f64,
     count: usize,
@@ -72,6 +73,7 @@ impl Stream {
             time: f64::INFINITY,
             position: 0.0,
             speed: 0.0,
+            usual: 0.0,
             block,
             sum: 0.0,
             count: 0,
@@ -88,11 +90,12 @@ impl Stream {
     pub fn sample(&mut self, time: f64, position: f64, force: f64) -> Option<(f64, f64)> {
         let elapsed = time - self.time;
         if elapsed > (5.0 / self.rate).max(0.02) {
-            *self = Self { speed: self.speed, ..Self::new(self.rate, self.options) };
+            let (speed, usual, position) = (self.speed, self.usual, self.position);
+            *self = Self { speed, usual, position, ..Self::new(self.rate, self.options) };
         }
         if elapsed > 0.0 {
-            let gain = 1.0 - (-1.0 / (0.03 * self.rate)).exp();
-            self.speed += gain * ((position - self.position) / elapsed - self.speed);
+            self.speed += self.gain(0.01) * ((position - self.position) / elapsed - self.speed);
+            self.usual += self.gain(0.3) * (self.speed - self.usual);
         }
         (self.time, self.position) = (time, position);
         self.sum += force;
@@ -108,8 +111,12 @@ impl Stream {
         let drop = -self.residual.deviation;
         self.residual.restart(force);
         self.renew();
-        // What is seen in holds and retractions is no puncture.
-        (self.speed > 1e-4).then_some((drop, confidence))
+        // What is seen in holds and retractions, or while the friction goes because the needle stops, is no puncture.
+        (self.speed > (self.usual / 4.0).max(1e-4)).then_some((drop, confidence))
+    }
+
+    fn gain(&self, time_constant: f64) -> f64 {
+        1.0 - (-1.0 / (time_constant * self.rate)).exp()
     }
 
     fn renew(&mut self) {
@@ -137,6 +144,10 @@ impl Stream {
         let (short, long) = runs.split_at(self.window);
         let (short, long): (f64, f64) = (short.iter().sum(), long.iter().sum());
         let mean = self.recent.iter().sum::<f64>() / self.recent.len() as f64;
-        if mean < 0.0 { (short.max(1e-12) / long.max(1e-12)).ln() } else { f64::NEG_INFINITY }
+        if mean < 0.0 {
+            (short.max(1e-12) / long.max(1e-12)).ln()
+        } else {
+            f64::NEG_INFINITY
+        }
     }
 }

@@ -27,7 +27,7 @@ pub struct Options {
 fn options() -> Result<Options, String> {
     let mut arguments = std::env::args().skip(1);
     let mut options =
-        Options { trend: 0.1, run: 0.3, window: 0.01, threshold: 2.0, gaussian_process: false };
+        Options { trend: 0.05, run: 0.5, window: 0.005, threshold: 2.0, gaussian_process: false };
     match arguments.next().as_deref() {
         Some("bocpd") => {}
         Some("argpcp") => options.gaussian_process = true,
@@ -51,7 +51,11 @@ fn answer(stream: &mut Stream, line: &str) -> Option<(f64, f64)> {
     let mut fields = line.split(',').map(|field| field.trim().parse::<f64>());
     let mut next = || fields.next()?.ok();
     let (time, position, force) = (next()?, next()?, next()?);
-    if force.is_finite() { stream.sample(time, position, force) } else { None }
+    if force.is_finite() {
+        stream.sample(time, position, force)
+    } else {
+        None
+    }
 }
 
 fn serve() -> Result<(), String> {

@@ -65,7 +65,11 @@ impl Residual {
         let followed = self.deviation.clamp(-limit, limit);
         self.level = Some(predicted + self.gain_level * followed);
         self.slope += self.gain_slope * followed;
-        if known { self.deviation / (1.25 * self.scale) } else { 0.0 }
+        if known {
+            self.deviation / (1.25 * self.scale)
+        } else {
+            0.0
+        }
     }
 }
 
