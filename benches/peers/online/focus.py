@@ -15,7 +15,7 @@ from entrant import OnResidual, serve
 class FocusDetector(OnResidual):
     def __init__(self, rate, trend, allowance, threshold):
         self.allowance = allowance
-        self.longest = 2000  # samples, so that the package's sums do not grow for ever
+        self.longest = 2000  # samples between new starts, so that the sums do not grow for ever
         super().__init__(rate, trend, threshold)
 
     def reset(self):
@@ -23,9 +23,16 @@ class FocusDetector(OnResidual):
 
     def update(self, residual):
         self.seen += 1
-        self.focus.update(residual + self.allowance)
-        statistic = self.focus.ql.opt
-        if self.seen > self.longest and statistic < 1:
+        focus = self.focus
+        focus.update(residual + self.allowance)
+        statistic = focus.ql.opt
+        if statistic > 2:
+            # With a known mean before the change, the package's statistic counts rises too, whatever the side.
+            pieces = focus.ql.ps[:-1]
+            statistic = max((p.get_max(focus.cs) for p in pieces if p.argmax(focus.cs) < 0), default=0.0)
+            if statistic == 0:
+                self.reset()
+        elif self.seen > self.longest:
             self.reset()
         return statistic
 
