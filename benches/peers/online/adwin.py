@@ -31,4 +31,4 @@ class AdwinDetector(OnResidual):
 
 
 if __name__ == "__main__":
-    serve(AdwinDetector, trend=0.1, delta=0.002, threshold=1.0)
+    serve(AdwinDetector, trend=0.03, delta=0.002, threshold=1.0)

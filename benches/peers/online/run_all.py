@@ -7,6 +7,7 @@ programs' defaults.
 
 import argparse
 import pathlib
+import shutil
 import subprocess
 
 from common import HERE, Bench, in_pairs, load
@@ -19,7 +20,7 @@ def main():
     parser.add_argument("stylet")
     parser.add_argument("--cases", type=int, default=100)
     parser.add_argument("--seed", type=int, default=2)
-    parser.add_argument("--split", default="test")
+    parser.add_argument("--split", default="judge")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("target/online-benchmark"))
     parser.add_argument("--env", type=pathlib.Path, default=pathlib.Path("target/peers-online"))
     parser.add_argument("--entrants", help="only these, with commas between")
@@ -41,6 +42,8 @@ def main():
 
     in_pairs(answer, names)
     page = bench.out / "page"
+    if page.exists():
+        shutil.rmtree(page)
     print(bench.call("judge-online", bench.streams, *map(bench.folder, names), "--out", page), end="")
     print(f"page: {page}")
 

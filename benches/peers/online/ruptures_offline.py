@@ -1,9 +1,9 @@
-"""Ruptures on whole streams: an upper bound that is not causal, by the package ruptures (Truong, Oudre, Vayatis 2020, Signal Processing 167).
+"""Whole streams at once, not causal: what a detector may hope for that knows the future. By the package ruptures (Truong, Oudre, Vayatis 2020, Signal Processing 167).
 
-    python ruptures_offline.py DIR OUT [--rate HZ] [--penalty P] [--threshold T]
+    python ruptures_offline.py DIR OUT [--step M] [--penalty P] [--threshold T]
 
 Reads the streams DIR/streams/NNNN.csv (time_s,position_m,force_n) and writes OUT/events.csv (stream,time_s,drop_n,confidence). PELT (Killick,
-Fearnhead, Eckley 2012) cuts the force, averaged to at most `rate` Hz, into straight lines that need not meet. Where one line begins below the
+Fearnhead, Eckley 2012) cuts the force, averaged over about `step` of the needle's way (50 to 500 Hz), into straight lines that need not meet. Where one line begins below the
 end of the line before, with the needle advancing at no less than a quarter of the mean speed of the 0.3 s before, that is an event at the
 likeliest of the stream's own samples. Its confidence is the drop over the standard deviation of the residuals. `penalty` is that of PELT in
 variances of the noise.
@@ -45,14 +45,20 @@ def line_end(y, first):
     return y.mean() + slope * (x[0] if first else x[-1])
 
 
-def events(time, position, force, rate, penalty, threshold):
-    block = max(1, round((len(time) - 1) / (time[-1] - time[0]) / rate))
+def noise_of(y):
+    """Standard deviation of the noise from second differences over three samples."""
+    return max(np.median(np.abs(y[6:] - 2 * y[3:-3] + y[:-6])) / 0.6745 / np.sqrt(6), 1e-4)
+
+
+def events(time, position, force, step, penalty, threshold):
+    seconds = time[-1] - time[0]
+    rate = np.clip((position.max() - position.min()) / seconds / step, 50, 500)
+    block = max(1, round((len(time) - 1) / seconds / rate))
     count = len(force) // block
     y = force[: count * block].reshape(count, block).mean(axis=1)
     if count < 12:
         return
-    noise = np.median(np.abs(np.diff(y, 2))) / 0.6745 / np.sqrt(6)
-    noise = max(noise, 1e-4)
+    noise = noise_of(y)
     cuts = ruptures.Pelt(custom_cost=Line(), min_size=3, jump=1).fit(y).predict(pen=penalty * noise**2)
     edges = [0, *cuts]
     for begin, cut, end in zip(edges, edges[1:], edges[2:]):
@@ -77,7 +83,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("out", type=pathlib.Path)
-    parser.add_argument("--rate", type=float, default=100.0)
+    parser.add_argument("--step", type=float, default=1e-4)
     parser.add_argument("--penalty", type=float, default=30.0)
     parser.add_argument("--threshold", type=float, default=1.0)
     options = parser.parse_args()
@@ -88,7 +94,7 @@ def main():
         for path in sorted((options.folder / "streams").glob("*.csv")):
             time, position, force = np.genfromtxt(path, delimiter=",", skip_header=1, unpack=True)
             good = np.isfinite(force)
-            found = events(time[good], position[good], force[good], options.rate, options.penalty, options.threshold)
+            found = events(time[good], position[good], force[good], options.step, options.penalty, options.threshold)
             for at, drop, confidence in found:
                 writer.writerow([path.stem, f"{at:.6f}", f"{drop:.4f}", f"{confidence:.3f}"])
 

@@ -81,7 +81,11 @@ impl Stream {
             peak: Peak::new(slow, options.threshold),
             detector: Detector::new(&options, slow),
             recent: Vec::new(),
-            window: ((options.window * slow).round() as usize).max(2),
+            window: ((options.window * slow).round() as usize).max(if options.gaussian_process {
+                5
+            } else {
+                2
+            }),
             run: 0,
         }
     }
