@@ -31,4 +31,4 @@ class AdwinDetector(OnResidual):
 
 
 if __name__ == "__main__":
-    serve(AdwinDetector, trend=0.03, delta=0.002, threshold=1.0)
+    serve(AdwinDetector, trend=0.02, delta=0.0002, threshold=2.0)

@@ -21,4 +21,4 @@ class Cusum(OnResidual):
 
 
 if __name__ == "__main__":
-    serve(Cusum, trend=0.03, allowance=2.0, threshold=8.0)
+    serve(Cusum, trend=0.15, allowance=1.0, threshold=25.0)

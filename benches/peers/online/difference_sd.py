@@ -69,4 +69,4 @@ class DifferenceSd:
 
 
 if __name__ == "__main__":
-    serve(DifferenceSd, statistic="mean", window=0.02, reference=0.05, threshold=5.0)
+    serve(DifferenceSd, statistic="mean", window=0.02, reference=0.1, threshold=10.0)

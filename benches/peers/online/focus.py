@@ -38,4 +38,4 @@ class FocusDetector(OnResidual):
 
 
 if __name__ == "__main__":
-    serve(FocusDetector, trend=0.03, allowance=1.0, threshold=15.0)
+    serve(FocusDetector, trend=0.15, allowance=0.5, threshold=30.0)

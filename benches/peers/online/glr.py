@@ -78,4 +78,4 @@ class Glr:
 
 
 if __name__ == "__main__":
-    serve(Glr, window=0.03, reference=0.1, threshold=6.0)
+    serve(Glr, window=0.015, reference=0.2, threshold=5.0)

@@ -51,4 +51,4 @@ class HighPass:
 
 
 if __name__ == "__main__":
-    serve(HighPass, cutoff=5.0, smooth=40.0, threshold=4.0)
+    serve(HighPass, cutoff=2.0, smooth=8.0, threshold=6.0)

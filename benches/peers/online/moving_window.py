@@ -10,7 +10,7 @@ from collections import deque
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--window", type=float, default=0.02, help="length of each window in s")
-parser.add_argument("--threshold", type=float, default=0.1, help="smallest drop in N")
+parser.add_argument("--threshold", type=float, default=0.3, help="smallest drop in N")
 options = parser.parse_args()
 
 for line in sys.stdin:

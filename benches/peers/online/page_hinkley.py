@@ -26,4 +26,4 @@ class PageHinkleyDetector(OnResidual):
 
 
 if __name__ == "__main__":
-    serve(PageHinkleyDetector, trend=0.03, delta=2.0, threshold=8.0)
+    serve(PageHinkleyDetector, trend=0.06, delta=2.0, threshold=15.0)

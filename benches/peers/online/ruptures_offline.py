@@ -84,8 +84,8 @@ def main():
     parser.add_argument("folder", type=pathlib.Path)
     parser.add_argument("out", type=pathlib.Path)
     parser.add_argument("--step", type=float, default=1e-4)
-    parser.add_argument("--penalty", type=float, default=30.0)
-    parser.add_argument("--threshold", type=float, default=1.0)
+    parser.add_argument("--penalty", type=float, default=100.0)
+    parser.add_argument("--threshold", type=float, default=2.0)
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     with open(options.out / "events.csv", "w", newline="") as file:

@@ -27,7 +27,7 @@ pub struct Options {
 fn options() -> Result<Options, String> {
     let mut arguments = std::env::args().skip(1);
     let mut options =
-        Options { trend: 0.05, run: 0.5, window: 0.005, threshold: 2.0, gaussian_process: false };
+        Options { trend: 0.02, run: 0.5, window: 0.01, threshold: 2.5, gaussian_process: false };
     match arguments.next().as_deref() {
         Some("bocpd") => {}
         Some("argpcp") => options.gaussian_process = true,
