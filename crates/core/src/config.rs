@@ -338,6 +338,9 @@ pub struct StyletConfig {
     pub friction_law: FrictionLaw,
     /// Slow changes of the force during retraction count as friction; off: only what was estimated during insertion.
     pub track_retraction: bool,
+    /// Velocities are derived from the positions by a causal filter, not measured. Where the needle stops within a step they say so one
+    /// sample later, so that a fall of the force that may be the friction's waits for the next position.
+    pub derived_velocity: bool,
 }
 
 impl Default for StyletConfig {
@@ -347,6 +350,7 @@ impl Default for StyletConfig {
             min_drop_share: 0.08,
             friction_law: FrictionLaw::Auto,
             track_retraction: true,
+            derived_velocity: false,
         }
     }
 }

@@ -205,7 +205,8 @@ impl Detector {
         match player {
             Player::Program(command) => Ok(Self::Program(Pipe::start(command)?)),
             Player::Core(algorithm) => {
-                let config = EnhanceConfig { algorithm: *algorithm, ..EnhanceConfig::default() };
+                let mut config = EnhanceConfig { algorithm: *algorithm, ..EnhanceConfig::default() };
+                config.stylet.derived_velocity = true;
                 let core = Enhancer::new(config.clone(), 0.0, vec![Sample::default(); STORED_SAMPLES]);
                 Ok(Self::Core { config, core, velocity: VelocityEstimator::default() })
             }

@@ -38,7 +38,7 @@ impl KalmanEnhancer {
             self.predictor.reset_level(force_n, &self.noise);
             self.estimator.skip_sample();
             self.reset_detector();
-            self.deferred = false;
+            (self.deferred, self.waited) = (false, false);
             self.deepest_m = at_least(self.deepest_m, sample.position_m);
             return;
         }
@@ -105,6 +105,7 @@ impl KalmanEnhancer {
             self.skip_sample();
             return;
         }
+        let waited = core::mem::replace(&mut self.waited, false);
         if outcome.alarm && forward && !outlier {
             let recent = self.output.ruptures > 0 && self.time_since_rupture_s <= MAX_DROP_DURATION_S;
             if recent {
@@ -112,6 +113,11 @@ impl KalmanEnhancer {
                 return;
             }
             if self.is_rupture(config) {
+                if config.stylet.derived_velocity && !waited && self.may_be_a_stop(sample) {
+                    self.waited = true;
+                    self.skip_sample();
+                    return;
+                }
                 self.declare_rupture(step, sample, outcome.excess_nats);
                 return;
             }
@@ -207,6 +213,14 @@ impl KalmanEnhancer {
     fn is_below_ruptures(&self, sample: &Sample) -> bool {
         let margin_n = SPIKE_SDS * libm::sqrt(self.noise.marginal_variance());
         sample.force_n - self.lowest_after_rupture_n(sample.position_m) < -margin_n
+    }
+
+    /// The force has fallen by no more than the friction along the shaft: the needle may have stopped within this step.
+    #[cold]
+    fn may_be_a_stop(&self, sample: &Sample) -> bool {
+        let friction_n = self.snapshot.friction(sample.position_m) * self.friction_drive_mps;
+        let margin_n = SPIKE_SDS * libm::sqrt(self.noise.marginal_variance());
+        self.last_drop_n.0 < friction_n + margin_n
     }
 
     #[inline(always)]
