@@ -81,8 +81,10 @@ impl KalmanEnhancer {
     /// The lowest force in N that a rupture may leave.
     pub(super) fn lowest_after_rupture_n(&self, position_m: f64) -> f64 {
         let bias = self.noise.bias_n();
-        // A drop may go on, and friction is known only where the base law holds and the last rupture stands.
+        // A drop may go on, and friction is known only where the base law holds and the last rupture stands. That the tip is free is
+        // no more than likely: at one speed a soft layer looks like growing friction.
         let known = self.estimator.passed_count > 0
+            && !self.estimator.tip_free
             && self.post_rupture.is_none()
             && self.rival.is_none()
             && self.misfit < MAX_ALARM_MISFIT;
