@@ -39,13 +39,13 @@ class Bench:
             raise SystemExit(f"stylet benchmark {' '.join(map(str, arguments))} failed:\n{run.stderr}")
         return run.stdout
 
-    def export(self, split, cases, seed):
+    def export(self, split, cases, seed, world="plain"):
         """Writes the streams; the key to them goes to a file beside their folder."""
         if self.streams.exists():
             shutil.rmtree(self.streams)
         self.streams.with_name("set.key.json").unlink(missing_ok=True)
         self.out.mkdir(parents=True, exist_ok=True)
-        self.call("export", "--online", "--split", split, "--cases", cases, "--seed", seed, "--out", self.streams)
+        self.call("export", "--online", "--world", world, "--split", split, "--cases", cases, "--seed", seed, "--out", self.streams)
 
     def folder(self, label):
         return self.out / "answers" / label

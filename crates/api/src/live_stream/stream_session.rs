@@ -132,6 +132,7 @@ fn output_json(sample: &Sample, out: &Output, counts: &StreamCounts, dropped: u6
 
 /// The core and its counts.
 pub struct Session {
+    config: EnhancerConfigFile,
     core: Enhancer<Vec<Sample>>,
     velocity: VelocityEstimator,
     counts: StreamCounts,
@@ -140,13 +141,18 @@ pub struct Session {
     broadcast: Arc<Broadcast>,
 }
 
+fn new_core(config: &EnhancerConfigFile) -> Enhancer<Vec<Sample>> {
+    let storage = vec![Sample::default(); STORED_SAMPLES];
+    Enhancer::new(config.enhance.clone(), config.surface_m, storage)
+}
+
 impl Session {
     /// A session that sends its lines to `broadcast`.
     #[must_use]
     pub fn new(config: &EnhancerConfigFile, broadcast: Arc<Broadcast>) -> Self {
-        let storage = vec![Sample::default(); STORED_SAMPLES];
         Self {
-            core: Enhancer::new(config.enhance.clone(), config.surface_m, storage),
+            core: new_core(config),
+            config: config.clone(),
             velocity: VelocityEstimator::default(),
             counts: StreamCounts::default(),
             total_delay: Duration::ZERO,
@@ -185,6 +191,10 @@ impl Session {
 
     fn step(&mut self, sample: StreamSample, arrived: Instant) -> Output {
         let StreamSample { time_s, position_m, force_n, velocity_mps } = sample;
+        if self.counts.samples == 0 && velocity_mps.is_none() {
+            self.config.enhance.stylet.derived_velocity = true;
+            self.core = new_core(&self.config);
+        }
         let velocity_mps = velocity_mps.unwrap_or_else(|| self.velocity.at(time_s, position_m));
         let sample = Sample { time_s, position_m, velocity_mps, force_n };
         let out = self.core.step(sample);

@@ -6,8 +6,8 @@
 
 use std::collections::VecDeque;
 
-/// Window in s: twenty samples at 1 kHz.
-const WINDOW_S: f64 = 0.02;
+/// Window in s: twenty intervals at 1 kHz, four at 200 Hz, and half a millisecond for stamps that are not exact.
+const WINDOW_S: f64 = 0.0205;
 /// Limits on the number of samples in the window.
 const MIN_SAMPLES: usize = 3;
 const MAX_SAMPLES: usize = 512;

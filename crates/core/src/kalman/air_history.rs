@@ -43,6 +43,8 @@ const LONG_LAG_FROM: f64 = 0.5;
 const BISECTIONS: u32 = 12;
 /// Independent samples from which a baseline that moves is known.
 const MIN_INDEPENDENT: f64 = 20.0;
+/// Independent samples from which the noise is known, to a ninth of its standard deviation.
+const MIN_FOR_NOISE: f64 = 40.0;
 /// Squared correlation of time and position above which drift and line are one.
 const INSEPARABLE: f64 = 0.99;
 /// Log odds between drift and line that name one of them.
@@ -212,12 +214,15 @@ impl AirHistory {
         self.take(sample, true);
     }
 
-    /// Takes a sample that may be one of the tissue, where the force changes more from sample to sample than the noise does.
+    /// Takes a sample that may be one of the tissue, where the force changes more from sample to sample than the noise does: it does not
+    /// inform a noise that is known.
     pub(super) fn push_doubtful(&mut self, sample: &Sample) {
-        self.take(sample, false);
+        let rho = self.rho();
+        let is_known = self.samples * (1.0 - rho) >= MIN_FOR_NOISE * (1.0 + rho);
+        self.take(sample, !is_known);
     }
 
-    fn take(&mut self, sample: &Sample, is_air: bool) {
+    fn take(&mut self, sample: &Sample, informs_noise: bool) {
         if self.samples == 0.0 {
             self.origin = *sample;
         }
@@ -228,17 +233,17 @@ impl AirHistory {
             force_n: sample.force_n - self.origin.force_n,
         };
         let slot = self.samples as usize % LONG_LAG;
-        if is_air && self.samples >= LONG_LAG as f64 {
+        if informs_noise && self.samples >= LONG_LAG as f64 {
             self.difference(2, new.force_n - self.recent_n[slot]);
         }
         self.recent_n[slot] = new.force_n;
         self.samples += 1.0;
         let [older, mut last] = self.before;
-        if is_air && last.count > 0.0 {
+        if informs_noise && last.count > 0.0 {
             self.difference(0, new.force_n - last.force_n);
         }
         if older.count > 0.0 {
-            if is_air {
+            if informs_noise {
                 self.difference(1, new.force_n - older.force_n);
             }
             let median = older.force_n.max(new.force_n).min(last.force_n.max(older.force_n.min(new.force_n)));

@@ -28,10 +28,11 @@ pub(crate) const REST_SPEED_MPS: f64 = 1e-5;
 const STEP_NOISE_RATIO: f64 = 0.1;
 const EXTRAPOLATED_NOISE_RATIO: f64 = 3.25;
 
-/// Smallest change of the travel from step to step that is no rounding error, in m, and the multiple of the encoder's step by which a
-/// travel may be off: half a step at either end, and some of the log.
+/// Smallest change of the travel from step to step that is no rounding error, in m; the multiple of the encoder's step by which a travel may
+/// be off, half a step at either end and some of the log; and the number of changes by one step that show an encoder at work.
 const MIN_ENCODER_STEP_M: f64 = 1e-12;
 const ENCODER_STEPS: f64 = 1.5;
+const MIN_SIGHTINGS: u8 = 4;
 
 /// Consecutive samples that must agree before the log is used again.
 const AGREEING_SAMPLES: u8 = 2;
@@ -42,9 +43,11 @@ pub(crate) struct VelocityEstimator {
     usual: f64,
     noise: f64,
     logged_mps: f64,
-    /// Travel of the last step in m, and its smallest change so far: the step of the encoder, if it has one.
+    /// Travel of the last step in m, its smallest change so far, and how often it has changed by that: the step of the encoder, if it has
+    /// one.
     moved_m: f64,
     encoder_step_m: f64,
+    sightings: u8,
     /// Mean velocities of the last three steps in m/s, newest first, and whether they have jumped.
     step_mps: [f64; 3],
     jumped: bool,
@@ -66,6 +69,7 @@ impl Default for VelocityEstimator {
             logged_mps: 0.0,
             moved_m: 0.0,
             encoder_step_m: f64::INFINITY,
+            sightings: 0,
             step_mps: [0.0; 3],
             jumped: false,
             standing: false,
@@ -91,10 +95,7 @@ impl VelocityEstimator {
         let dt_s = sample.time_s - last.time_s;
         let moved_m = sample.position_m - last.position_m;
         let before = core::mem::replace(&mut self.logged_mps, logged);
-        let change_m = (moved_m - core::mem::replace(&mut self.moved_m, moved_m)).abs();
-        if change_m > MIN_ENCODER_STEP_M && change_m < self.encoder_step_m {
-            self.encoder_step_m = change_m;
-        }
+        self.look_for_encoder_step(moved_m);
         if moved_m == 0.0 && (self.standing || logged.abs() <= REST_SPEED_MPS) {
             // A velocity smoothed forward and backward in time rises before the needle moves.
             self.smoothed_log |= before.abs() > REST_SPEED_MPS && logged.abs() > REST_SPEED_MPS;
@@ -113,7 +114,7 @@ impl VelocityEstimator {
         let difference = step - 0.5 * (logged + before);
         let min_variance = MIN_SD_FRACTION * speed_mps * (MIN_SD_FRACTION * speed_mps);
         let resolution_mps =
-            if self.encoder_step_m.is_finite() { ENCODER_STEPS * self.encoder_step_m / dt_s } else { 0.0 };
+            if self.sightings == MIN_SIGHTINGS { ENCODER_STEPS * self.encoder_step_m / dt_s } else { 0.0 };
         let limit = at_least(
             resolution_mps * resolution_mps,
             DISAGREEMENT_SDS_SQUARED * at_least(min_variance, self.usual),
@@ -139,6 +140,21 @@ impl VelocityEstimator {
             return resolved;
         }
         (logged, false)
+    }
+
+    /// Travels of a rounded position differ by multiples of the encoder's step; those of an exact one by ever smaller amounts.
+    #[inline(always)]
+    fn look_for_encoder_step(&mut self, moved_m: f64) {
+        let change_m = (moved_m - core::mem::replace(&mut self.moved_m, moved_m)).abs();
+        if change_m <= MIN_ENCODER_STEP_M || change_m > ENCODER_STEPS * self.encoder_step_m {
+            return;
+        }
+        if ENCODER_STEPS * change_m < self.encoder_step_m {
+            (self.encoder_step_m, self.sightings) = (change_m, 0);
+        }
+        if self.sightings < MIN_SIGHTINGS {
+            self.sightings += 1;
+        }
     }
 
     /// The log is smoothed and positions are used: a velocity jump within a step shows one sample later.
