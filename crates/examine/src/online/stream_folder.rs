@@ -229,7 +229,14 @@ fn table(path: &Path, header: &str) -> Result<Vec<(usize, Vec<Option<f64>>)>, Ch
 /// [`ChallengeError`].
 pub fn streams_with_truth(folder: &Path) -> Result<Vec<(String, Stream)>, ChallengeError> {
     let path = key_path(folder);
-    let text = std::fs::read_to_string(&path).map_err(file_error(&path))?;
+    let text = std::fs::read_to_string(&path).map_err(|e| {
+        content_error(
+            &path,
+            format!(
+                "{e}; answers are judged with the key that the export wrote next to the folder of the streams"
+            ),
+        )
+    })?;
     let key: StreamKey = serde_json::from_str(&text).map_err(|e| {
         content_error(
             &path,
