@@ -197,7 +197,14 @@ impl Answers<'_> {
 /// A detector that is running.
 enum Detector {
     Program(Pipe),
-    Core { config: EnhanceConfig, core: Enhancer<Vec<Sample>>, velocity: VelocityEstimator },
+    Core(Box<OwnCore>),
+}
+
+/// An algorithm of this project with the velocities that it is given.
+struct OwnCore {
+    config: EnhanceConfig,
+    core: Enhancer<Vec<Sample>>,
+    velocity: VelocityEstimator,
 }
 
 impl Detector {
@@ -208,7 +215,7 @@ impl Detector {
                 let mut config = EnhanceConfig { algorithm: *algorithm, ..EnhanceConfig::default() };
                 config.stylet.derived_velocity = true;
                 let core = Enhancer::new(config.clone(), 0.0, vec![Sample::default(); STORED_SAMPLES]);
-                Ok(Self::Core { config, core, velocity: VelocityEstimator::default() })
+                Ok(Self::Core(Box::new(OwnCore { config, core, velocity: VelocityEstimator::default() })))
             }
         }
     }
@@ -218,9 +225,9 @@ impl Detector {
             Self::Program(pipe) => pipe
                 .send(&format!("start {}\n", stream.rate_hz))
                 .map_err(|why| Error::Request(format!("stream {}: {why}", stream.number))),
-            Self::Core { config, core, velocity } => {
-                *core = Enhancer::new(config.clone(), 0.0, vec![Sample::default(); STORED_SAMPLES]);
-                *velocity = VelocityEstimator::default();
+            Self::Core(own) => {
+                own.core = Enhancer::new(own.config.clone(), 0.0, vec![Sample::default(); STORED_SAMPLES]);
+                own.velocity = VelocityEstimator::default();
                 Ok(())
             }
         }
@@ -233,7 +240,8 @@ impl Detector {
                 pipe.send(&format!("{time_s},{position_m},{force_n}\n"))?;
                 pipe.reply()
             }
-            Self::Core { core, velocity, .. } => {
+            Self::Core(own) => {
+                let OwnCore { core, velocity, .. } = own.as_mut();
                 let velocity_mps = velocity.at(time_s, position_m);
                 let out = core.step(Sample { time_s, position_m, velocity_mps, force_n });
                 if out.used {
@@ -348,6 +356,7 @@ pub fn online_files(scores: &[EntrantScore]) -> Result<OutputFiles, Error> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

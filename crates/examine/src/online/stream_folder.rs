@@ -192,8 +192,11 @@ pub fn stream_samples(folder: &Path, number: &str) -> Result<Vec<[f64; 3]>, Chal
         .collect()
 }
 
-/// Lines of numbers, empty fields as `None`, with their line numbers.
-fn table(path: &Path, header: &str) -> Result<Vec<(usize, Vec<Option<f64>>)>, ChallengeError> {
+/// Line number and numbers of a line, empty fields as `None`.
+type TableLine = (usize, Vec<Option<f64>>);
+
+/// The lines of a table with these columns; the last ones may be missing.
+fn table(path: &Path, header: &str) -> Result<Vec<TableLine>, ChallengeError> {
     let text = std::fs::read_to_string(path).map_err(file_error(path))?;
     let names: Vec<&str> = text.lines().next().unwrap_or("").trim().split(',').collect();
     let wanted: Vec<&str> = header.split(',').collect();
