@@ -63,8 +63,8 @@ pub(crate) struct KalmanEnhancer {
     pub(super) rival: Option<Rival>,
     /// The decision on the last sample, far from the prediction, waits for the next: the velocity may have jumped.
     pub(super) deferred: bool,
-    /// A rupture was not declared at the last sample, which may have been a stop.
-    pub(super) waited: bool,
+    /// Where a rupture was not declared, because the needle may have stopped there.
+    pub(super) waiting_from_m: Option<f64>,
     /// Samples since the last rupture, and the count at which the ruptured layer is reported next.
     pub(super) samples_since_rupture: u32,
     pub(super) next_report_at: u32,
@@ -148,7 +148,7 @@ impl KalmanEnhancer {
             jump: Jump::default(),
             rival: None,
             deferred: false,
-            waited: false,
+            waiting_from_m: None,
             samples_since_rupture: 0,
             next_report_at: u32::MAX,
             post_rupture: None,

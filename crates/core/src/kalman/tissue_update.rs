@@ -38,7 +38,7 @@ impl KalmanEnhancer {
             self.predictor.reset_level(force_n, &self.noise);
             self.estimator.skip_sample();
             self.reset_detector();
-            (self.deferred, self.waited) = (false, false);
+            (self.deferred, self.waiting_from_m) = (false, None);
             self.deepest_m = at_least(self.deepest_m, sample.position_m);
             return;
         }
@@ -105,7 +105,7 @@ impl KalmanEnhancer {
             self.skip_sample();
             return;
         }
-        let waited = core::mem::replace(&mut self.waited, false);
+        let waiting_from_m = self.waiting_from_m.take();
         if outcome.alarm && forward && !outlier {
             let recent = self.output.ruptures > 0 && self.time_since_rupture_s <= MAX_DROP_DURATION_S;
             if recent {
@@ -113,8 +113,8 @@ impl KalmanEnhancer {
                 return;
             }
             if self.is_rupture(config) {
-                if config.stylet.derived_velocity && !waited && self.may_be_a_stop(sample) {
-                    self.waited = true;
+                if config.stylet.derived_velocity && self.may_be_a_stop(sample, waiting_from_m) {
+                    self.waiting_from_m = waiting_from_m.or(Some(sample.position_m));
                     self.skip_sample();
                     return;
                 }
@@ -215,9 +215,14 @@ impl KalmanEnhancer {
         sample.force_n - self.lowest_after_rupture_n(sample.position_m) < -margin_n
     }
 
-    /// The force has fallen by no more than the friction along the shaft: the needle may have stopped within this step.
+    /// The force has fallen by no more than the friction along the shaft, and the needle may have stopped: since `waiting_from_m` no
+    /// position has shown that it goes on.
     #[cold]
-    fn may_be_a_stop(&self, sample: &Sample) -> bool {
+    fn may_be_a_stop(&self, sample: &Sample, waiting_from_m: Option<f64>) -> bool {
+        let shown_m = 2.0 * self.velocity_estimator.encoder_step_m();
+        if waiting_from_m.is_some_and(|from_m| sample.position_m - from_m > shown_m) {
+            return false;
+        }
         let friction_n = self.snapshot.friction(sample.position_m) * self.friction_drive_mps;
         let margin_n = SPIKE_SDS * libm::sqrt(self.noise.marginal_variance());
         self.last_drop_n.0 < friction_n + margin_n

@@ -48,6 +48,8 @@ pub(crate) struct VelocityEstimator {
     moved_m: f64,
     encoder_step_m: f64,
     sightings: u8,
+    /// Travel in m that the log has had since the position changed.
+    unmoved_m: f64,
     /// Mean velocities of the last three steps in m/s, newest first, and whether they have jumped.
     step_mps: [f64; 3],
     jumped: bool,
@@ -70,6 +72,7 @@ impl Default for VelocityEstimator {
             moved_m: 0.0,
             encoder_step_m: f64::INFINITY,
             sightings: 0,
+            unmoved_m: 0.0,
             step_mps: [0.0; 3],
             jumped: false,
             standing: false,
@@ -102,6 +105,14 @@ impl VelocityEstimator {
             (self.standing, self.step_mps, self.jumped) = (true, [0.0; 3], false);
             return (0.0, false);
         }
+        // A rounded position shows a stop where the needle should have moved by more than the rounding.
+        let expected_m = self.unmoved_m + logged.abs() * dt_s;
+        self.unmoved_m = if moved_m == 0.0 { expected_m } else { 0.0 };
+        let encoder_step_m = self.encoder_step_m();
+        if encoder_step_m > 0.0 && self.unmoved_m > ENCODER_STEPS * encoder_step_m {
+            (self.standing, self.step_mps, self.jumped) = (true, [0.0; 3], false);
+            return (0.0, true);
+        }
         let starts = core::mem::take(&mut self.standing);
         if dt_s <= 0.0 {
             return (logged, starts);
@@ -113,8 +124,7 @@ impl VelocityEstimator {
         }
         let difference = step - 0.5 * (logged + before);
         let min_variance = MIN_SD_FRACTION * speed_mps * (MIN_SD_FRACTION * speed_mps);
-        let resolution_mps =
-            if self.sightings == MIN_SIGHTINGS { ENCODER_STEPS * self.encoder_step_m / dt_s } else { 0.0 };
+        let resolution_mps = ENCODER_STEPS * self.encoder_step_m() / dt_s;
         let limit = at_least(
             resolution_mps * resolution_mps,
             DISAGREEMENT_SDS_SQUARED * at_least(min_variance, self.usual),
@@ -140,6 +150,11 @@ impl VelocityEstimator {
             return resolved;
         }
         (logged, false)
+    }
+
+    /// Step of the encoder in m; zero as long as none is known.
+    pub(super) fn encoder_step_m(&self) -> f64 {
+        if self.sightings == MIN_SIGHTINGS { self.encoder_step_m } else { 0.0 }
     }
 
     /// Travels of a rounded position differ by multiples of the encoder's step; those of an exact one by ever smaller amounts.
