@@ -60,7 +60,7 @@ pub enum DiagnoseError {
     /// The needle starts behind the tissue.
     #[error(
         "{name}: the needle begins behind the tissue: its smallest position is {lowest_m:.6} m, the tissue ends at {end_m:.6} m; does \
-         position zero mean the same in both? a column map shifts it with position: (name: \"position_m\", offset: {offset_m:.3}), which \
+         position zero mean the same in both? a column map shifts it with position: (name: \"...\", offset: {offset_m:.3}) with the name in your file, which \
          begins at the surface, or give the scenario the surface_m that the recording has"
     )]
     BeginsBehind {
@@ -76,7 +76,7 @@ pub enum DiagnoseError {
     /// Positions in another unit.
     #[error(
         "{name}: positions reach {deepest:.4} where the tissue ends at {end_m:.4} m: this looks like {unit}; give a column map \
-         with position: (name: \"position_m\", scale: {scale})"
+         with position: (name: \"...\", scale: {scale}) and the name in your file"
     )]
     PositionUnit {
         /// Recording.
@@ -93,7 +93,7 @@ pub enum DiagnoseError {
     /// Time in another unit.
     #[error(
         "{name}: it lasts {duration_s:.4} s, and {expected}: the time looks like {unit}; give a \
-         column map with time: (name: \"time_s\", scale: {scale})"
+         column map with time: (name: \"...\", scale: {scale}) and the name in your file"
     )]
     TimeUnit {
         /// Recording.
@@ -108,7 +108,9 @@ pub enum DiagnoseError {
         scale: &'static str,
     },
     /// Force with another unit or sign.
-    #[error("{name}: {what}; give a column map with force: (name: \"force_n\", scale: {scale})")]
+    #[error(
+        "{name}: {what}; give a column map with force: (name: \"...\", scale: {scale}) and the name in your file"
+    )]
     Force {
         /// Recording.
         name: String,

@@ -91,7 +91,7 @@ pub(crate) fn check_recordings(
                 "its whole travel is a thousandth of the tissue: is the position in kilometres, or scaled twice?"
             } else {
                 "is this the right scenario, and does position zero mean the same in both? a column map shifts it with \
-                 position: (name: \"position_m\", offset: 0.01), or give the scenario the surface_m that the recording has"
+                 position: (name: \"...\", offset: 0.01) with the name in your file and the distance that is missing, or give the scenario the surface_m that the recording has"
             };
             return Err(DiagnoseError::NeverReaches { name: name(), deepest_m, surface_m, remedy });
         }
