@@ -1,11 +1,11 @@
 """What the Python entrants share: the protocol, a causal residual, and when an event is reported.
 
-A detector is a class made anew for every stream as `Detector(rate, **options)`. Its method `sample(force)` returns None or, when it
+A detector is a class made again for every stream as `Detector(rate, **options)`. Its method `sample(force)` returns None or, when it
 reports a puncture, (drop in N or None, confidence). `serve(Detector, option=default, ...)` does the rest:
 
 - an event is passed on only while the needle advances, with at least a quarter of its mean speed of the last 0.3 s: what a detector sees in
   holds and retractions, or while the friction goes because the needle stops, is no puncture;
-- after a gap in the samples the detector is made anew;
+- after a gap in the samples the detector is made again;
 - a sample without a force (nan) is left out.
 """
 
@@ -83,7 +83,7 @@ class Residual:
     """The force less its own straight line, extrapolated by one sample, in noise standard deviations.
 
     Level and slope follow the force with the time constant given (a steady-state Kalman filter of a straight line). A deviation beyond four
-    standard deviations does not drag them along; where it lasts longer than the time constant, they start anew. The
+    standard deviations does not drag them along; where it lasts longer than the time constant, they start again. The
     noise is the mean absolute residual of the last second.
     """
 
@@ -129,7 +129,7 @@ class OnResidual:
     """A detector of changes of the mean at work on the residual of the force.
 
     A subclass has `reset()` and `update(residual)`, which returns how strongly the residual speaks for a fall of its mean by now. Samples
-    faster than 1 kHz are averaged to about 1 kHz first. After an event, residual and detector start anew.
+    faster than 1 kHz are averaged to about 1 kHz first. After an event, residual and detector start again.
     """
 
     def __init__(self, rate, trend, threshold):

@@ -5,7 +5,7 @@ Before it the force is a straight line fitted to `reference` seconds; the size o
 statistic is the step over its standard error, the square root of twice the log-likelihood ratio, at its best change time, for falls only.
 
 Options: `window` is the longest time since the change in s, `reference` the length of the fitted line in s, `threshold` that of the
-statistic. Samples faster than 1 kHz are averaged to about 1 kHz first. After an event, the window fills anew.
+statistic. Samples faster than 1 kHz are averaged to about 1 kHz first. After an event, the window fills again.
 """
 
 from math import sqrt

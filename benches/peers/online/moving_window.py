@@ -1,7 +1,7 @@
 """The smallest entrant, to start your own from: a threshold on the drop of a moving mean.
 
 The mean of the last `window` seconds is compared with the mean of the window before it. When the drop between them, above the
-threshold, is past its largest value, a puncture is reported while the needle advances, and both windows fill anew.
+threshold, is past its largest value, a puncture is reported while the needle advances, and both windows fill again.
 """
 
 import argparse

@@ -1,7 +1,7 @@
 //! Benchmark of online puncture detection: replaying streams to a detector sample by sample, and judging answers.
 
 use crate::error::Error;
-use crate::live_stream::VelocityEstimator;
+use crate::live_stream::{STORED_SAMPLES, VelocityEstimator};
 use crate::output_files::OutputFiles;
 use rayon::prelude::*;
 use std::fmt::Write as _;
@@ -19,9 +19,6 @@ use stylet_examine::online::stream_folder::{
 };
 use stylet_examine::online::stream_id::{Row, Split, StreamId, stream_ids};
 use stylet_examine::online::stream_scores::{EntrantScore, score_entrant};
-
-/// Samples that a core keeps for its replay.
-const STORED_SAMPLES: usize = 1 << 16;
 
 fn request(error: ChallengeError) -> Error {
     Error::Request(error.to_string())

@@ -10,7 +10,7 @@ use stylet_core::{Enhancer, Output, Sample, UnusedReason};
 use stylet_scenario::EnhancerConfigFile;
 
 /// Samples of a layer that the core stores: 65 s at 1 kHz.
-const STORED_SAMPLES: usize = 1 << 16;
+pub(crate) const STORED_SAMPLES: usize = 1 << 16;
 
 /// Counts of a session.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

@@ -183,11 +183,9 @@ impl Counts {
     }
 }
 
-/// The value of this rank, `None` of none.
+/// The quantile, `None` of no values.
 fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let rank = (share * values.len() as f64).ceil().max(1.0) as usize;
-    values.get(rank - 1).copied()
+    (!values.is_empty()).then(|| stylet_stats::quantile(values, share))
 }
 
 /// Scores a detector's answers to these streams, given with their numbers.

@@ -1,6 +1,6 @@
 //! The page of `stylet benchmark judge-online`.
 
-use crate::chart_model::{Chart, Scale, Series};
+use crate::chart_model::{Chart, Series};
 use crate::page_model::{Cell, Page, Section, Status, Table};
 use crate::pages::formatting::significant_or_dash;
 use crate::palette::Colour;
@@ -87,7 +87,7 @@ fn summary_table(scores: &[EntrantScore]) -> Table {
     )
 }
 
-/// Median delay over false alarms per hour, one curve per detector with a confidence.
+/// A quantity over false alarms per hour, one curve per detector with a confidence.
 fn curve_chart(
     scores: &[EntrantScore],
     y_label: &str,
@@ -95,7 +95,6 @@ fn curve_chart(
 ) -> Chart {
     let mut chart = Chart::new(y_label, "False alarms per hour, log10", y_label);
     chart.parametric = true;
-    chart.scale = Scale::Linear;
     for (k, s) in scores.iter().filter(|s| !s.curve.is_empty()).enumerate() {
         let points: Vec<(f64, f64)> = (0..s.curve.len())
             .filter_map(|i| Some((s.curve[i].false_per_hour.max(0.1).log10(), y(s, i)?)))

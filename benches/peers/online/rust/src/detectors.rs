@@ -11,7 +11,7 @@ use crate::Options;
 
 type Kernel = AddKernel<ProductKernel<ConstantKernel, RBFKernel>, WhiteKernel>;
 
-/// The crate's detectors begin anew after so many samples without a change, since the work per sample grows with the run.
+/// The crate's detectors begin again after so many samples without a change, since the work per sample grows with the run.
 const LONGEST: usize = 300;
 const LONGEST_PROCESS: usize = 100;
 

@@ -3,7 +3,7 @@
 /// The force less its own straight line, extrapolated by one sample, in noise standard deviations.
 ///
 /// Level and slope follow the force with a time constant. A deviation beyond four standard deviations does not drag them
-/// along; where it lasts longer than the time constant, they start anew. The noise is the mean absolute residual of the last second.
+/// along; where it lasts longer than the time constant, they start again. The noise is the mean absolute residual of the last second.
 pub struct Residual {
     gain_level: f64,
     gain_slope: f64,
