@@ -6,8 +6,8 @@ use crate::cli::terminal_output::print;
 use std::fmt::Write as _;
 use stylet_api::reference_insertion::{ReferenceInsertion, reference_insertion};
 use stylet_report::significant;
-use stylet_scenario::{closest_name, effect_line, load, renamed_ron_name};
-use stylet_tissue::{AnyEffect, Effect, EffectInfo, general_effects, per_layer_effects};
+use stylet_scenario::{closest_name, effect_line, load_effects, renamed_ron_name};
+use stylet_tissue::{Effect, EffectInfo, general_effects, per_layer_effects};
 
 /// Lists the effects, or shows one.
 ///
@@ -16,7 +16,7 @@ use stylet_tissue::{AnyEffect, Effect, EffectInfo, general_effects, per_layer_ef
 pub fn effects(args: &EffectsArgs) -> Result<(), Failure> {
     let mut own = Vec::new();
     for file in &args.effects {
-        own.extend(load::<Vec<AnyEffect>>(file)?.iter().map(Effect::info));
+        own.extend(load_effects(file)?.iter().map(Effect::info));
     }
     let library = || general_effects().chain(per_layer_effects()).chain(own.iter().copied());
     let Some(name) = &args.name else {

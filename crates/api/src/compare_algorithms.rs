@@ -3,13 +3,13 @@
 use crate::benchmark::parse_word;
 use crate::error::Error;
 use crate::output_files::OutputFiles;
-use rayon::prelude::*;
 use stylet_core::EnhanceConfig;
 use stylet_core::config::Algorithm;
 use stylet_examine::{Case, CaseId, Hide, Plan, Severity, Size, World, Wrong};
 use stylet_record::TrueRupture;
 use stylet_scenario::Scenario;
 use stylet_score::{Trace, match_ruptures};
+use stylet_stats::parallel::*;
 use stylet_sweep::algorithm_comparison::{ComparisonRow, DetectionCounts, algorithm_name, compare_algorithm};
 
 /// The row of a scenario read from `file`, over this many noise seeds; `done` is called after each insertion.

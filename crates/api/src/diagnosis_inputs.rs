@@ -2,13 +2,13 @@
 
 use crate::error::Error;
 use crate::output_folder::recover;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use stylet_diagnose::NamedRecording;
 use stylet_record::{ReadOptions, read_csv};
 use stylet_scenario::Scenario;
+use stylet_stats::parallel::*;
 
 /// Inputs of a diagnosis, as `inputs.json` holds them.
 #[derive(Clone, Debug, Serialize, Deserialize)]

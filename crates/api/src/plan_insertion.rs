@@ -10,7 +10,7 @@ use stylet_diagnose::{NamedRecording, Options};
 use stylet_plan::identifiability::Identifiability;
 use stylet_plan::{InformationState, Limits, Plan};
 use stylet_report::pages::{diagnosis, experiment_plan as plan_page, identifiability as shown_page};
-use stylet_scenario::{Motion, Scenario, motion_to_ron};
+use stylet_scenario::{Scenario, load_motion, motion_to_ron};
 
 /// A planned insertion and its basis.
 pub struct PlanReport {
@@ -197,6 +197,6 @@ impl IdentifiabilityReport {
 /// # Errors
 /// An invalid file, or a motion that the scenario's robot cannot make.
 pub fn replace_motion(scenario: &mut Scenario, motion: &Path) -> Result<(), Error> {
-    scenario.motion = stylet_scenario::load::<Motion>(motion)?;
+    scenario.motion = load_motion(motion)?;
     scenario.check().map_err(|p| Error::Request(format!("{}: {p}", motion.display())))
 }

@@ -1,7 +1,6 @@
 //! Fit of the base law: force drops are assigned to layers, then parameters and rupture times are fitted in turn.
 
 use crate::random_effect_selection::select_random_effects;
-use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::{Effort, Fit, fit, fit_from_zero_scatter};
@@ -12,6 +11,7 @@ use stylet_identify::noise::{Noise, NoiseSource};
 use stylet_identify::rupture_assignment::assign_ruptures;
 use stylet_identify::update_event_times::update_event_times;
 use stylet_scenario::Scenario;
+use stylet_stats::parallel::*;
 use stylet_tissue::Effect;
 
 /// Prior of a scenario: its tissue, effects and tolerances.

@@ -12,13 +12,13 @@ use crate::random_effect_selection::select_random_effects;
 use crate::zero_steps::{
     remove_weak_steps, toggled, unassigned, with_steps_in_residual, zero_step_candidates,
 };
-use rayon::prelude::*;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{EffectTerm, ZeroStep};
 use stylet_identify::noise::NoiseSource;
 use stylet_identify::score_test::ScoreTest;
+use stylet_stats::parallel::*;
 use stylet_tissue::{EffectInfo, Proposal};
 
 /// A baseline that reduces the residual by this factor, to the noise, is not put to question by other effects.
@@ -118,8 +118,9 @@ impl Baseline {
                 }
                 let others: Vec<(f64, Fitted)> = candidates
                     .drops
-                    .par_iter()
+                    .iter()
                     .take(MAX_ALTERNATIVES)
+                    .into_par_iter()
                     .filter_map(|drop| fitted(toggled(&best.0.zero_steps, *drop)))
                     .map(|other| (gain_of(&other, &best), other))
                     .collect();
@@ -179,14 +180,15 @@ fn may_pay(infos: &[&'static EffectInfo], base: &Fit, data: &FitData) -> bool {
     if (0..data.recording_count()).any(offset_pays) {
         return true;
     }
-    infos.par_iter().any(|info| {
+    let is_needed = |info: &&'static EffectInfo| {
         let Proposal::LinearColumns(groups) = info.proposal else { return false };
         let needed = bic_penalty(info.parameters.len(), data.compared_block_count()) + MIN_GAIN_NATS;
         groups.iter().filter_map(|g| g.first()).any(|values| {
             let column = score_test.effect_column(&EffectTerm::new(info, values));
             column.is_some_and(|c| score_test.gain(&[c]).nats > needed)
         })
-    })
+    };
+    infos.par_iter().map(is_needed).into_iter().any(|needed| needed)
 }
 
 pub(crate) fn leaves_noise(f: &Fit, data: &FitData) -> bool {

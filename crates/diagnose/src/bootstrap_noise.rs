@@ -7,11 +7,11 @@
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
-use rayon::prelude::*;
 use stylet_identify::fit::Linearization;
 use stylet_identify::likelihood::FitData;
 use stylet_identify::noise::NoiseSource;
 use stylet_stats::linear_algebra::{SymmetricMatrix, dot};
+use stylet_stats::parallel::*;
 
 /// Bootstrap replicates.
 const REPLICATES: usize = 8;

@@ -3,9 +3,9 @@
 use crate::model_comparison::{bic_penalty, likelihood_gain};
 use crate::model_pruning::{effect_at_bound, required_gain_nats};
 use crate::selection_state::Search;
-use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit_if_below};
 use stylet_identify::model::EffectTerm;
+use stylet_stats::parallel::*;
 
 /// Effects within this many nats of the best are equivalent.
 pub const EQUIVALENCE_NATS: f64 = 3.0;

@@ -29,11 +29,11 @@ use crate::selection_state::{Search, SearchStage};
 use crate::sensor_artefact_causes::sensor_artefact_causes;
 use crate::verdict::{Assessment, assess_search, is_kept, move_negligible};
 use crate::zero_steps::{ZeroStepReport, zero_effects};
-use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
 use stylet_identify::likelihood::FitData;
 use stylet_scenario::Scenario;
+use stylet_stats::parallel::*;
 use stylet_tissue::Effect;
 
 /// Options of a diagnosis.

@@ -12,12 +12,12 @@ use crate::random_effect_selection::select_random_effects;
 use crate::reweighted_fit::fit_reweighted;
 use crate::selection_restarts::{MAX_BEHIND_SHARE, is_new_effect};
 pub use crate::selection_state::{Search, SearchStage};
-use rayon::prelude::*;
 use stylet_identify::evidence_nats::Nats;
 use stylet_identify::fit::{Effort, Fit, fit, fit_if_below};
 use stylet_identify::likelihood::{FitData, residuals};
 use stylet_identify::model::Model;
 use stylet_identify::score_test::ScoreTest;
+use stylet_stats::parallel::*;
 use stylet_tissue::ChainStage;
 
 /// Upper limit of selected effects.
@@ -204,9 +204,9 @@ impl Search {
             let model = with_updated_times(model.clone(), &self.data, times);
             fit(&model, coarse, Effort::SHORT).and_then(|f| if_close(&f.model))
         };
-        let with_model = with_model.par_iter().filter_map(|s| s.model.as_ref());
-        full.extend(short.par_iter().skip(1).filter_map(|f| if_close(&f.model)).collect::<Vec<_>>());
-        full.extend(with_model.flat_map_iter(|m| [far(m), near(m)]).flatten().collect::<Vec<_>>());
+        let with_model = with_model.iter().filter_map(|s| s.model.as_ref());
+        full.extend(short.iter().skip(1).into_par_iter().filter_map(|f| if_close(&f.model)));
+        full.extend(with_model.into_par_iter().map(|m| [far(m), near(m)]).into_iter().flatten().flatten());
         self.rank(&mut full);
         full
     }

@@ -3,11 +3,11 @@
 use crate::base_law_fit::PreparedRecordings;
 use crate::effect_start::EffectStart;
 use crate::rupture_start_values::start_from_ruptures;
-use rayon::prelude::*;
 use stylet_identify::fit::JacobianColumn;
 use stylet_identify::force_drops::ForceDrop;
 use stylet_identify::model::EffectTerm;
 use stylet_identify::score_test::{ScoreTest, ScoreTestResult, scale_strengths};
+use stylet_stats::parallel::*;
 use stylet_tissue::{ChainStage, EffectInfo, Proposal};
 
 /// Best start values of every effect that the model does not include, at most two each, largest gain first.
@@ -33,6 +33,7 @@ pub fn effect_starts(
             starts.truncate(2);
             starts
         })
+        .into_iter()
         .filter(|s| !s.is_empty())
         .collect();
     all.sort_by(|a, b| b[0].gain_nats.total_cmp(&a[0].gain_nats));
@@ -246,8 +247,8 @@ fn break_starts(
     depths.retain(|d| *d < deepest);
     let mut out: Vec<EffectStart> = depths
         .par_iter()
-        .flat_map_iter(|depth| {
-            STRETCHES_M.iter().filter(move |s| **s < *depth).filter_map(move |stretch| {
+        .map(|depth| {
+            let at = |stretch: &f64| {
                 let force: Vec<Vec<f64>> = score_test
                     .data
                     .recordings
@@ -268,8 +269,11 @@ fn break_starts(
                 let k = gain.coefficients[0];
                 let term = || EffectTerm::new(info, &[depth - stretch, k, k * stretch]);
                 (k > 1.0).then(|| EffectStart::new(term(), &gain))
-            })
+            };
+            STRETCHES_M.iter().filter(|s| **s < *depth).filter_map(at).collect::<Vec<_>>()
         })
+        .into_iter()
+        .flatten()
         .collect();
     out.sort_by(|a, b| b.gain_nats.total_cmp(&a.gain_nats));
     out.truncate(2);

@@ -11,7 +11,6 @@ use crate::input_checks::{CleanRecordings, NamedRecording, check_recordings, cle
 use crate::parameter_labels::label_parameters;
 use crate::verdict::base_parameters;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use stylet_core::{EnhanceConfig, Sample};
@@ -19,6 +18,7 @@ use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
 use stylet_record::{QualityNote, Recording};
 use stylet_scenario::Scenario;
 use stylet_score::{ContactFinding, ContactHypothesis, Trace};
+use stylet_stats::parallel::*;
 use stylet_tissue::Tissue;
 
 /// Speeds inside the tissue that differ by less than this factor count as one.

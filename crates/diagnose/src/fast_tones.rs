@@ -7,9 +7,9 @@
 
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty};
 use core::f64::consts::{PI, TAU};
-use rayon::prelude::*;
 use stylet_record::Recording;
 use stylet_stats::order_statistics::median_of;
+use stylet_stats::parallel::*;
 use stylet_stats::spectrum::{PADDING, PowerSpectrum, SampledSignal};
 
 /// Length in s of the windows in which amplitude and phase are constant.
@@ -75,6 +75,7 @@ pub(crate) fn remove_fast_tones(
             .par_iter()
             .zip(exclude)
             .map(|(r, x)| Samples::new(r, x, 2 * per_block + 1))
+            .into_iter()
             .filter(|s| (s.step_s / step_s - 1.0).abs() < 0.01)
             .collect();
         let Some((tone, waves)) = strongest_tone(&samples, lowest_hz) else { break };
@@ -174,7 +175,7 @@ fn power(samples: &[Samples], hz: f64) -> f64 {
         let ([a, b], n) = s.sinusoid(hz, 0..s.fast_n.len());
         (a * a + b * b) * n
     };
-    samples.par_iter().map(of).sum()
+    samples.par_iter().map(of).into_iter().sum()
 }
 
 /// The strongest significant tone from `lowest_hz` on, and its force (N) in every recording.

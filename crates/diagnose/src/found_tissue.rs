@@ -1,10 +1,10 @@
 //! Layers of a tissue from the recordings alone, as the online algorithm finds them: no scenario is needed.
 
-use rayon::prelude::*;
 use stylet_core::{EnhanceConfig, Sample};
 use stylet_record::Recording;
 use stylet_score::{FoundLayer, Trace, found_layers};
 use stylet_stats::median_of;
+use stylet_stats::parallel::*;
 use stylet_tissue::{Layer, Tissue};
 
 /// Thinnest layer in m.

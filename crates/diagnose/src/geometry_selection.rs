@@ -8,10 +8,10 @@
 use crate::base_law_fit::{PreparedRecordings, with_updated_times};
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use crate::selection_state::Search;
-use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit, fit_if_below};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{EffectTerm, FreeParameters, Model};
+use stylet_stats::parallel::*;
 use stylet_tissue::{ChainStage, EffectInfo, Proposal};
 
 /// Largest deviation of the free parameters from a pattern, relative to its size.

@@ -1,11 +1,11 @@
 //! Prediction of held-out recordings, and the jackknife of effect strengths.
 
 use crate::varying_coefficient_test::varying_coefficient_test;
-use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::likelihood::{FitData, ReplayCache, replay};
 use stylet_identify::model::{Model, NO_RUPTURE, RecordingParameters};
 use stylet_identify::score_test::ScoreTest;
+use stylet_stats::parallel::*;
 
 /// Shift (samples) by which a predicted rupture may be moved to fit best: its phase within a sample is not an error.
 const RUPTURE_SHIFT_SAMPLES: f64 = 2.0;

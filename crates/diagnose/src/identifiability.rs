@@ -4,13 +4,13 @@ use crate::check_json::EffectVisibility;
 use crate::diagnosis_json::Cause;
 use crate::geometry_selection::free_geometry;
 use crate::motion_period::common_motion_period_s;
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::EffectTerm;
 use stylet_identify::score_test::{ScoreTest, scale_strengths};
+use stylet_stats::parallel::*;
 use stylet_tissue::{ChainStage, EffectInfo, FitScale, Proposal};
 
 /// Nats that the search requires of an effect with two parameters, about.

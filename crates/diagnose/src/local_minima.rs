@@ -3,10 +3,10 @@
 use crate::base_law_fit::{with_noise_of, with_updated_times};
 use crate::model_comparison::MIN_GAIN_NATS;
 use crate::selection_state::Search;
-use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit, fit_if_below};
 use stylet_identify::likelihood::{FitData, residuals};
 use stylet_identify::model::{EffectTerm, Model};
+use stylet_stats::parallel::*;
 use stylet_tissue::Proposal;
 
 /// Shifts of a layer boundary that are tried, in tolerances of the thickness.
@@ -79,14 +79,15 @@ impl Search {
         minima.extend(along(UPDATED_TIME_STEPS, true));
         minima.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut fits: Vec<Fit> = minima
-            .into_par_iter()
+            .into_iter()
             .take(MAX_MINIMA)
+            .into_par_iter()
             .filter_map(|(_, model)| fit(&with_updated_times(model, &coarse, times), &coarse, Effort::SHORT))
             .collect();
         fits.sort_by(|a, b| a.nats().total_cmp(&b.nats()));
         let wanted = leader.nats() - MIN_GAIN_NATS;
         let full = |f: &Fit| self.full_fit_below(f.model.clone(), times, wanted);
-        let fitted = fits.par_iter().take(2).filter_map(full).collect::<Vec<Fit>>();
+        let fitted = fits.iter().take(2).into_par_iter().filter_map(full).collect::<Vec<Fit>>();
         fitted.into_iter().min_by(|a, b| a.nats().total_cmp(&b.nats()))
     }
 

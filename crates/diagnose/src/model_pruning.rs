@@ -3,11 +3,11 @@
 use crate::base_law_fit::with_updated_times;
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use crate::selection_state::Search;
-use rayon::prelude::*;
 use stylet_identify::evidence_nats::Nats;
 use stylet_identify::fit::{Effort, Fit, Linearization, fit};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{EffectTerm, ParameterRole};
+use stylet_stats::parallel::*;
 use stylet_tissue::{FitScale, Proposal};
 
 /// A strength is determined when it differs from neutral by this many standard deviations.

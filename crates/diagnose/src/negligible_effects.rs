@@ -5,8 +5,8 @@ use crate::held_out::{
     FreeRunResidual, held_out_residuals_with_random_effects, pooled_rms, sample_noise_sd_n,
 };
 use crate::selection_state::Search;
-use rayon::prelude::*;
 use stylet_identify::fit::{Effort, fit};
+use stylet_stats::parallel::*;
 use stylet_tissue::{ChainStage, EffectInfo, Proposal};
 
 /// A negligible effect.

@@ -8,12 +8,12 @@ use crate::confidence_intervals::Covariance;
 use crate::diagnosis_json::{Estimate, LabelledParameter, ParameterByRecording, ParameterLabel};
 use crate::geometry_selection::free_geometry;
 use crate::parameter_labels::base_role;
-use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::ParameterRole;
 use stylet_identify::noise::NoiseSource;
 use stylet_stats::Z95;
+use stylet_stats::parallel::*;
 use stylet_stats::special_functions::chi_square_sf;
 
 /// Effort of the fit to one recording, which starts at the fit to all.

@@ -4,11 +4,11 @@
 //! effect explains the differences.
 
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
-use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit, fit_if_below};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{FreeParameters, Model, RecordingParameters};
 use stylet_identify::noise::NoiseSource;
+use stylet_stats::parallel::*;
 
 /// Penalty in nats of the free random effects.
 fn penalty_nats(free: FreeParameters, data: &FitData) -> f64 {

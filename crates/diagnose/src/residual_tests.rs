@@ -7,10 +7,10 @@
 //! `sum_(r<s) sum_(b,b') C_r(b,b') C_s(b,b')`, with `C_r` from the autocovariance of a recording's residual after
 //! subtracting the means of the others (Bartlett 1935 for two series).
 
-use rayon::prelude::*;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::FitData;
+use stylet_stats::parallel::*;
 
 /// Structure in the residual of a model.
 #[derive(Clone, Debug, Default)]

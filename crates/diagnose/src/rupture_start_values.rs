@@ -5,13 +5,13 @@
 //! forces and scatter.
 
 use crate::effect_start::EffectStart;
-use rayon::prelude::*;
 use stylet_identify::likelihood::replay;
 use stylet_identify::model::{EffectTerm, Model, ParameterRole, Scatter};
 use stylet_identify::rupture_likelihood::{
     FORCE_SCATTER_GRID, RuptureEvent, evaluate_rupture, scatter_prior_nats,
 };
 use stylet_identify::score_test::ScoreTest;
+use stylet_stats::parallel::*;
 use stylet_tissue::EffectInfo;
 
 /// Grid points per pass. The first pass covers the parameter's search range; later passes refine around the best point.

@@ -8,10 +8,10 @@ use crate::effect_start::EffectStart;
 use crate::effect_start_values::starts_at_common_drops;
 use crate::model_comparison::MIN_GAIN_NATS;
 use crate::selection_state::Search;
-use rayon::prelude::*;
 use stylet_identify::fit::{Effort, Fit, fit_if_below};
 use stylet_identify::likelihood::{FitData, residuals};
 use stylet_identify::model::EffectTerm;
+use stylet_stats::parallel::*;
 use stylet_tissue::Proposal;
 
 /// Candidates behind the best by more than this share of its gain get no full fit.

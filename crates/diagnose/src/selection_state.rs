@@ -2,12 +2,12 @@
 
 use crate::base_law_fit::{COARSENING_FACTOR, MISFIT_FACTOR};
 use crate::tone_detection::{detect_tones, with_noise_without_tones};
-use rayon::prelude::*;
 use stylet_identify::delay_refinement::refine_delay;
 use stylet_identify::fit::{Effort, Fit, fit, fit_from_zero_scatter};
 use stylet_identify::likelihood::{FitData, residuals, with_break_uncertainty};
 use stylet_identify::model::EffectTerm;
 use stylet_identify::noise::NoiseSource;
+use stylet_stats::parallel::*;
 
 /// One step of the selection.
 #[derive(Clone, Debug)]

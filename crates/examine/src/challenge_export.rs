@@ -9,11 +9,11 @@ use crate::simulator::effect::{FURTHER_IDS, IDS};
 use core::fmt::Write as _;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
+use stylet_stats::parallel::*;
 
 /// The answer key: the case behind each number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -177,7 +177,8 @@ pub fn score_answers(folder: &Path, answers: &Path) -> Result<Vec<CaseOutcome>, 
         });
     }
     key.cases
-        .par_iter()
+        .iter()
+        .into_par_iter()
         .map(|(number, id)| {
             let case = make_case(id)?;
             let answer = match answers_given.get(number) {

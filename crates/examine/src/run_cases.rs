@@ -4,12 +4,12 @@ use crate::cases::case_id::{CaseId, GENERATOR_VERSION};
 use crate::cases::case_recordings::{Question, make_case};
 use crate::scoring::case_outcome::CaseOutcome;
 use crate::scoring::diagnosis_answer::Answer;
-use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::io::{BufRead, Write};
 use std::path::Path;
 use std::sync::Mutex;
 use std::time::Instant;
+use stylet_stats::parallel::*;
 
 /// Why an examination ended early.
 #[derive(Debug, thiserror::Error)]

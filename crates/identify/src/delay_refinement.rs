@@ -8,7 +8,7 @@
 use crate::fit::{Effort, Fit, fit};
 use crate::likelihood::{FitData, residuals};
 use crate::model::{EffectTerm, Model};
-use rayon::prelude::*;
+use stylet_stats::parallel::*;
 use stylet_tissue::Effect;
 
 /// Grid spacings as shares of the sampling interval.

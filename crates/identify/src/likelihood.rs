@@ -8,9 +8,9 @@ use crate::model::{CompiledModel, Model, NO_RUPTURE, Parameter};
 use crate::motion::MotionPiece;
 use crate::noise::{HUBER_LOSS, Noise, NoiseSource, WhiteningPlan};
 use crate::rupture_likelihood::{RuptureEvent, evaluate_rupture};
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
+use stylet_stats::parallel::*;
 
 /// Recordings in blocks with their noise model.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use crate::likelihood::{FitData, ReplayCache};
 use crate::model::{Model, NO_RUPTURE};
-use rayon::prelude::*;
+use stylet_stats::parallel::*;
 
 /// Trial moves in blocks, in either direction.
 const MOVES_BLOCKS: [f64; 6] = [0.5, 1.0, 2.0, 4.0, 9.0, 20.0];

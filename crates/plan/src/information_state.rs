@@ -7,7 +7,6 @@
 
 use crate::candidate::Candidate;
 use crate::gram_matrix::{add, gram_matrix, schur_complement};
-use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
 use stylet_identify::fit::{JacobianColumn, Linearization};
@@ -18,6 +17,7 @@ use stylet_identify::noise::Noise;
 use stylet_record::Recording;
 use stylet_scenario::Motion;
 use stylet_stats::linear_algebra::SymmetricMatrix;
+use stylet_stats::parallel::*;
 
 /// Motions are compared over blocks of this length in s ...
 const COARSE_S: f64 = 0.06;
@@ -174,8 +174,9 @@ impl InformationState {
         let first = base.effects.len();
         let of: Vec<Option<Vec<JacobianColumn>>> = self
             .candidates
-            .par_iter()
+            .iter()
             .filter(|c| !c.effects.is_empty())
+            .into_par_iter()
             .map(|c| {
                 let model = c.build_model(base);
                 let whole = change(&model)?;

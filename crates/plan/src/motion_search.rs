@@ -6,9 +6,9 @@ use crate::limits::Limits;
 use crate::motion_programs::{
     DIMENSIONS, StartConditions, infeasibility, low_discrepancy_point, motion_from_point,
 };
-use rayon::prelude::*;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_scenario::Motion;
+use stylet_stats::parallel::*;
 
 /// Number of sampled motions.
 const SAMPLED_MOTIONS: usize = 200;

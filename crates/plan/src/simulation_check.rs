@@ -9,9 +9,9 @@ use crate::insertion_plan::{CandidateTrials, Plan, plan_with_motion};
 use crate::limits::Limits;
 use crate::motion_search::MotionSearchResult;
 use crate::starting_information::candidate_scenario;
-use rayon::prelude::*;
 use stylet_diagnose::{Diagnosis, NamedRecording, Options, Verdict, diagnose};
 use stylet_scenario::{ForceTorque, Motion, Robot, Scenario, Sensor};
+use stylet_stats::parallel::*;
 
 /// Number of candidates under which the best motions are compared, most probable first.
 const COMPARED_CANDIDATES: usize = 4;

@@ -10,10 +10,10 @@ use crate::paper_experiments::Case;
 use crate::run_outcome::{Offline, Outcome};
 use crate::simulated_insertion::Insertion;
 use crate::tuned_thresholds::Tuning;
-use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Mutex;
 use stylet_scenario::InputError;
+use stylet_stats::parallel::*;
 use stylet_testbed::SimulateError;
 
 /// Noise of the force/torque sensor, in mN, where nothing else is said: the laboratory's standard deviation of
@@ -220,7 +220,6 @@ impl Study {
         let first = plan.first_seed;
         let outcomes: Vec<Done> = jobs
             .into_par_iter()
-            .with_max_len(1)
             .map(|job| {
                 let found = one(&job, first, &tunings);
                 done();

@@ -7,6 +7,14 @@ use crate::validate_effects::candidate;
 use std::path::Path;
 use stylet_tissue::{AnyEffect, Effect};
 
+/// The effects of a file of custom effects.
+///
+/// # Errors
+/// [`InputError`] with line and column.
+pub fn load_effects(file: &Path) -> Result<Vec<AnyEffect>, InputError> {
+    parse(&file.display().to_string(), &read_text(file)?)
+}
+
 impl Scenario {
     /// Adds the effects of a file to the candidates; one that is there already is kept once.
     ///

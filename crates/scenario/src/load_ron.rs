@@ -126,7 +126,15 @@ pub fn parse<T: DeserializeOwned>(file: &str, text: &str) -> Result<T, InputErro
     ron_options().from_str(text).map_err(|error| explain_parse_error(file, text, &error))
 }
 
-/// A motion as RON, readable by [`load`].
+/// Reads a motion as written by [`motion_to_ron`].
+///
+/// # Errors
+/// [`InputError`] when the file is invalid.
+pub fn load_motion(path: &Path) -> Result<crate::motion::Motion, InputError> {
+    load(path)
+}
+
+/// A motion as RON, readable by [`load_motion`].
 ///
 /// # Errors
 /// When a value cannot be written as RON.

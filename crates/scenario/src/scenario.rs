@@ -156,4 +156,10 @@ impl Scenario {
         let body = crate::ron_dialect::ron_options().to_string_pretty(self, pretty)?;
         Ok(format!("Scenario{body}\n"))
     }
+
+    /// The scenario as compact JSON.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        serde_json::to_string(self).unwrap_or_default()
+    }
 }

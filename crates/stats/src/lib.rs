@@ -14,6 +14,7 @@
 //! | [`linear_algebra`] | small dense matrices: Cholesky factor, scalar product |
 //! | [`spectrum`] | power spectrum of evenly sampled signals, detection of tones |
 //! | [`number_format`] | numbers as text: significant digits, per cent, p-values |
+//! | [`parallel`] | parallel maps in order |
 //! | [`interpolation`], [`rank_correlation`] | linear interpolation; ranks and Spearman's correlation |
 //!
 //! All functions use `f64` and are deterministic (`libm`, sums in the order given: the same bits on every machine and for
@@ -28,6 +29,7 @@ pub mod moments;
 pub mod normal;
 pub mod number_format;
 pub mod order_statistics;
+pub mod parallel;
 pub mod rank_correlation;
 pub mod robust_linear_prediction;
 pub mod robust_loss;

@@ -1,9 +1,8 @@
 //! Draws the scenario of a trial from its number.
 
 use crate::sampling_design::{SamplingDesign, trial_seed};
-use crate::scenario_field;
 use crate::sweep_file::Sweep;
-use stylet_scenario::Scenario;
+use stylet_scenario::{Scenario, set_fields};
 
 /// Consecutive invalid draws after which the sweep fails.
 pub const MAX_DRAW_ATTEMPTS: u32 = 100;
@@ -84,7 +83,7 @@ impl<'a> TrialSampler<'a> {
             sweep.file.effects.iter().zip(switches).map(|(e, u)| *u < e.probability).collect();
         let mut scenario = sweep.template.clone();
         scenario.seed = trial_seed(sweep.file.seed, trial);
-        let set = scenario_field::set_fields(&mut scenario, &sweep.fields, &values);
+        let set = set_fields(&mut scenario, &sweep.fields, &values);
         let mut index = 0;
         scenario.effects.retain(|_| {
             index += 1;

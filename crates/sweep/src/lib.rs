@@ -6,14 +6,12 @@
 #![forbid(unsafe_code)]
 
 pub mod algorithm_comparison;
-mod distribution;
 mod draw_trial;
 mod failure_rate_bins;
 mod parallel_trials;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod sampling_design;
-mod scenario_field;
 pub mod score_gate;
 pub mod sensitivity;
 pub mod shard;
@@ -24,19 +22,18 @@ mod trial_row;
 pub mod trial_simulation;
 mod trial_table;
 
-pub use distribution::Distribution;
 pub use draw_trial::{DrawError, DrawnTrial, TrialSampler};
 pub use failure_rate_bins::{BIN_COUNT, FailureMapRow, FailureRateBin, failure_map_rows, failure_rate_bins};
 pub use parallel_trials::{TrialError, run_trials, run_trials_with_threads};
 #[cfg(feature = "parquet")]
 pub use parquet::write_parquet;
-pub use sampling_design::{MAX_SOBOL_DIMENSIONS, Sampling, SamplingDesign, trial_seed};
-pub use scenario_field::ScenarioField;
+pub use sampling_design::{MAX_SOBOL_DIMENSIONS, SamplingDesign, trial_seed};
+pub use stylet_scenario::{Distribution, RandomEffect, Sampling, ScenarioField, SweepFile, VariedField};
 pub use summary::{
     OutcomeSensitivity, QuantitySensitivity, ScoreSummary, Summary, WorstTrial, failed, score_value,
     summarise,
 };
-pub use sweep_file::{Overrides, RandomEffect, Sweep, SweepFile, VariedField};
+pub use sweep_file::{Overrides, Sweep};
 pub use trial_csv::write_csv;
 pub use trial_row::{Columns, TrialRow};
 pub use trial_table::{DiskTrialTable, TrialTable, TrialTableWriter};

@@ -2,20 +2,7 @@
 
 use rand::rngs::ChaCha8Rng;
 use rand::{Rng, SeedableRng};
-use serde::{Deserialize, Serialize};
-
-/// Sampling method.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Sampling {
-    /// Independent random draws.
-    #[default]
-    Random,
-    /// Latin hypercube: each of `trials` equally likely strata of every quantity is sampled once.
-    LatinHypercube,
-    /// Sobol sequence (direction numbers of Joe and Kuo 2008) with a random digital shift, for up to [`MAX_SOBOL_DIMENSIONS`]
-    /// quantities.
-    Sobol,
-}
+use stylet_scenario::Sampling;
 
 /// Largest number of quantities for [`Sampling::Sobol`].
 pub const MAX_SOBOL_DIMENSIONS: usize = 21;

@@ -5,12 +5,14 @@
 
 use crate::parallel_trials::{TrialError, run_trials};
 use crate::summary::score_value;
-use crate::sweep_file::{Overrides, Sweep, SweepFile};
+use crate::sweep_file::{Overrides, Sweep};
 use crate::trial_row::{Columns, TrialRow};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use stylet_scenario::{FieldError, InputError, Scenario, closest_name, parse, read_text};
+use stylet_scenario::{
+    FieldError, InputError, Sampling, Scenario, SweepFile, closest_name, parse, read_text,
+};
 use stylet_stats::{Interval, mean_interval, quantile_interval, sorted, wilson};
 
 /// Statistic of a score over the insertions.
@@ -136,7 +138,7 @@ pub fn load(path: &Path, seed: Option<u64>) -> Result<Vec<LoadedGate>, InputErro
                 let file = SweepFile {
                     scenario: run.clone(),
                     trials,
-                    sampling: crate::sampling_design::Sampling::Random,
+                    sampling: Sampling::Random,
                     seed: seed.unwrap_or(scenario.seed),
                     vary: Vec::new(),
                     effects: Vec::new(),

@@ -40,7 +40,8 @@ pub fn first_order(x: &[f64], y: &[f64]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampling_design::{Sampling, SamplingDesign};
+    use crate::sampling_design::SamplingDesign;
+    use stylet_scenario::Sampling;
 
     #[test]
     fn the_median_lies_in_its_interval_and_the_interval_covers() {

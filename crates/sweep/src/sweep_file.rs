@@ -1,64 +1,14 @@
-//! The sweep file: scenario, number of trials, drawn quantities. Format: docs/reference/files.md, section "Sweep".
+//! A sweep: its file with its scenario, checked.
 
-use crate::distribution::Distribution;
-use crate::sampling_design::{MAX_SOBOL_DIMENSIONS, Sampling};
-use crate::scenario_field::ScenarioField;
-use serde::{Deserialize, Serialize};
+use crate::sampling_design::MAX_SOBOL_DIMENSIONS;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
-use stylet_scenario::{FieldError, InputError, Robot, Scenario, Sensor, parse, read_text};
-use stylet_tissue::AnyEffect;
+use stylet_scenario::{
+    FieldError, InputError, Robot, Sampling, Scenario, ScenarioField, Sensor, SweepFile, read_text,
+};
 
 /// Largest number of trials, which bounds row numbers and memory.
 const MAX_TRIALS: u64 = 100_000_000;
-
-/// One quantity that is drawn.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct VariedField {
-    /// Path of the field, such as `tissue.layers[1].stiffness_n_per_m`. `effects[i]` counts the
-    /// scenario's effects first, then the sweep's.
-    pub path: String,
-    /// Its distribution, in the field's unit.
-    pub with: Distribution,
-}
-
-/// An effect that is switched on at random.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RandomEffect {
-    /// The effect with its parameters.
-    pub effect: AnyEffect,
-    /// Probability that it is on, 0 to 1.
-    pub probability: f64,
-}
-
-/// `Sweep(...)` as in the file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-#[serde(rename = "Sweep")]
-pub struct SweepFile {
-    /// Scenario file, relative to the sweep's.
-    pub scenario: PathBuf,
-    /// Number of trials.
-    pub trials: u64,
-    /// Sampling method.
-    #[serde(default)]
-    pub sampling: Sampling,
-    /// Seed of all draws.
-    #[serde(default = "one")]
-    pub seed: u64,
-    /// Quantities that are drawn.
-    #[serde(default)]
-    pub vary: Vec<VariedField>,
-    /// Effects that are switched on at random.
-    #[serde(default)]
-    pub effects: Vec<RandomEffect>,
-}
-
-fn one() -> u64 {
-    1
-}
 
 /// Values from the command line that replace those of the file.
 #[derive(Clone, Copy, Debug, Default)]
@@ -92,7 +42,7 @@ impl Sweep {
     pub fn load(path: &Path, overrides: Overrides) -> Result<Self, InputError> {
         let text = read_text(path)?;
         let shown = path.display().to_string();
-        let mut file: SweepFile = parse(&shown, &text)?;
+        let mut file = SweepFile::parse(&shown, &text)?;
         file.trials = overrides.trials.unwrap_or(file.trials);
         file.seed = overrides.seed.unwrap_or(file.seed);
         let scenario_path = path.parent().unwrap_or(Path::new("")).join(&file.scenario);
@@ -160,10 +110,7 @@ impl Sweep {
     /// The sweep as a file over `scenario.ron` in the same folder, with the overrides.
     #[must_use]
     pub fn to_ron(&self) -> String {
-        let file = SweepFile { scenario: PathBuf::from("scenario.ron"), ..self.file.clone() };
-        let pretty = Default::default();
-        let body = stylet_scenario::ron_options().to_string_pretty(&file, pretty).unwrap_or_default();
-        format!("Sweep{body}\n")
+        SweepFile { scenario: PathBuf::from("scenario.ron"), ..self.file.clone() }.to_ron()
     }
 
     /// The scenario of [`Sweep::to_ron`], without the sweep's effects.
@@ -180,8 +127,8 @@ impl Sweep {
         let mut hash = Sha256::new();
         hash.update(env!("CARGO_PKG_VERSION"));
         let file = SweepFile { scenario: PathBuf::new(), ..self.file.clone() };
-        for part in [serde_json::to_string(&self.template), serde_json::to_string(&file)] {
-            hash.update(part.unwrap_or_default());
+        for part in [self.template.to_json(), file.to_json()] {
+            hash.update(part);
             hash.update([0]);
         }
         hex(&hash.finalize())

@@ -3,7 +3,6 @@
 use crate::error::Error;
 use crate::live_stream::{STORED_SAMPLES, VelocityEstimator};
 use crate::output_files::OutputFiles;
-use rayon::prelude::*;
 use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -19,6 +18,7 @@ use stylet_examine::online::stream_folder::{
 };
 use stylet_examine::online::stream_id::{Row, Split, StreamId, stream_ids};
 use stylet_examine::online::stream_scores::{EntrantScore, score_entrant};
+use stylet_stats::parallel::*;
 
 fn request(error: ChallengeError) -> Error {
     Error::Request(error.to_string())

@@ -13,7 +13,6 @@ use crate::held_out::predict_free_run;
 use crate::input_checks::{NamedRecording, clean_recordings};
 pub use prediction_band::BAND_LEVEL;
 use prediction_band::{Band, Uncertainty};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
@@ -21,6 +20,7 @@ use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{Model, NO_RUPTURE};
 use stylet_identify::noise::Noise;
 use stylet_scenario::Scenario;
+use stylet_stats::parallel::*;
 pub use surface_friction_refit::Refit;
 
 /// Prediction of one recording.

@@ -8,11 +8,11 @@ use super::scored_model::{
     with_coarse_blocks,
 };
 use super::segmented_recording::SegmentedRecording;
-use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::likelihood::residuals;
 use stylet_identify::model::{Assumptions, EffectTerm, MAX_VARYING_PARAMETERS, Model, TiedParameter};
 use stylet_identify::rupture_likelihood::RuptureEvent;
+use stylet_stats::parallel::*;
 use stylet_tissue::AnyEffect;
 
 /// The same for a parameter group within an effect, which is never reported as a cause. One standard error

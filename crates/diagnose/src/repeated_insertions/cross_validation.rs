@@ -7,9 +7,9 @@ use super::multistart_fit::{SetFit, fit_with_noise_updates};
 use super::population_prediction::{DRAWS, PredictedForce, predict_force};
 use super::random_effects_population::Population;
 use super::segmented_recording::{SegmentedRecording, group_by_speed_and_stroke};
-use rayon::prelude::*;
 use stylet_identify::model::NO_RUPTURE;
 use stylet_stats::interpolate;
+use stylet_stats::parallel::*;
 
 /// Half width (s) of the window around a rupture.
 const RUPTURE_HALF_WINDOW_S: f64 = 0.5;

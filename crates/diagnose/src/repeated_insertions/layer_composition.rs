@@ -12,7 +12,6 @@ use super::segmented_recording::mean_speeds;
 use super::start_values::{SLIP_RATE_INDEX, base_law_prior};
 use super::stick_slip_fit::fit_stick_slip;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
-use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::model::{
     Assumptions, DayParameters, EffectTerm, Model, NO_RUPTURE, ParameterRole, RecordingParameters,
@@ -20,6 +19,7 @@ use stylet_identify::model::{
 use stylet_record::Recording;
 use stylet_record::sensor_artefacts::{self, SensorArtefacts};
 use stylet_stats::median_of;
+use stylet_stats::parallel::*;
 use stylet_tissue::{AnyEffect, DeepIndentation, Effect, ShaftSlip, Tissue};
 
 /// Seed of the start values.

@@ -6,7 +6,6 @@ use super::start_values::{
     EXPECTED_DAY_FRICTION_SD, EXPECTED_DAY_SURFACE_SD_M, SLIP_RATE_INDEX, StartValues, shaft_slip_start,
 };
 use rand::{RngExt, rngs::ChaCha8Rng};
-use rayon::prelude::*;
 use std::sync::Arc;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::discrepancy_noise::discrepancy_noise;
@@ -16,6 +15,7 @@ use stylet_identify::model::{EffectTerm, Model, ParameterRole};
 use stylet_identify::noise::Noise;
 use stylet_identify::update_event_times::update_event_times;
 use stylet_record::sensor_artefacts::SensorArtefacts;
+use stylet_stats::parallel::*;
 use stylet_tissue::{AnyEffect, Effect, Tissue};
 
 /// Block length (s) of repeated recordings: insertions do not repeat more finely.

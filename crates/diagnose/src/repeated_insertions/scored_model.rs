@@ -5,9 +5,9 @@ use super::multistart_fit::{SET_BLOCK_S, SetFit};
 use super::population_prediction::predict_force;
 use super::random_effects_population::Population;
 use super::segmented_recording::{SegmentedRecording, group_by_speed_and_stroke, have_several_speeds};
-use rayon::prelude::*;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::model::Model;
+use stylet_stats::parallel::*;
 use stylet_tissue::{Effect, EffectInfo, ShaftSlip};
 
 /// Folds of the cross-validation ...

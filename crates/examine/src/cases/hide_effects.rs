@@ -214,7 +214,7 @@ mod tests {
     use super::*;
     use crate::cases::case_id::{Severity, Size, Wrong};
     use crate::cases::case_setup::set_up_case;
-    use rayon::prelude::*;
+    use stylet_stats::parallel::*;
 
     fn id(wrong: Wrong, hide: Hide, index: u64) -> CaseId {
         CaseId {

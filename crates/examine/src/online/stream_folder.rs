@@ -9,10 +9,10 @@ use crate::challenge_export::{ChallengeError, key_path};
 use core::fmt::Write as _;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
+use stylet_stats::parallel::*;
 
 /// Version of the generator of streams: under another number the same name may stand for another stream.
 const STREAM_VERSION: u32 = 1;

@@ -7,8 +7,8 @@ use crate::model::{Model, NO_RUPTURE, Parameter, ParameterRole};
 use crate::noise::HUBER_LOSS;
 use crate::rupture_likelihood::rupture_rows_at;
 use core::ops::Range;
-use rayon::prelude::*;
 use stylet_stats::linear_algebra::{CholeskyFactor, SymmetricMatrix, dot};
+use stylet_stats::parallel::*;
 
 /// Linearization of a model at its current parameters.
 pub struct Linearization {

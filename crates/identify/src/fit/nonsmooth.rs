@@ -4,8 +4,8 @@ use super::damped_step::{apply_step, damped_step};
 use super::{Effort, FIRST_DAMPING, Fit, Linearization, MAX_DAMPING_TRIALS, fit};
 use crate::likelihood::{FitData, residuals};
 use crate::model::Model;
-use rayon::prelude::*;
 use stylet_stats::linear_algebra::dot;
+use stylet_stats::parallel::*;
 
 /// Predicted gain in nats below which a point without a descending step counts as a minimum.
 const MIN_PREDICTED_GAIN_NATS: f64 = 1.0;

@@ -5,9 +5,9 @@ use super::force_bin::{AfterBreak, ForceBinNoise};
 use super::long_memory::{AR_ORDER, ROW_LEN, SEARCH_STRETCHES, STRETCHES, regression_row, running_sums};
 use super::{HUBER_K, HUBER_LOSS, Noise};
 use crate::block_averages::BlockAverages;
-use rayon::prelude::*;
 use stylet_stats::autoregressive::stationary;
 use stylet_stats::order_statistics::{median, quantile_of_sorted};
+use stylet_stats::parallel::*;
 use stylet_stats::robust_linear_prediction::{prediction_residual, robust_linear_prediction};
 
 /// Largest number of force ranges.

@@ -11,8 +11,8 @@ use crate::seed_spread::Spread;
 use crate::simulated_insertion::Insertion;
 use crate::study_conditions::View;
 use crate::value_source::Sourced;
-use rayon::prelude::*;
 use stylet_report::{Cell, Table, percent, significant};
+use stylet_stats::parallel::*;
 
 struct Spec {
     number: &'static str,

@@ -11,8 +11,8 @@ use crate::run_outcome::Outcome;
 use crate::seed_spread::Spread;
 use crate::study_conditions::View;
 use crate::value_source::Sourced;
-use rayon::prelude::*;
 use stylet_report::{Cell, Table, percent, significant};
+use stylet_stats::parallel::*;
 
 /// A figure of one insertion.
 pub(super) struct Spec {

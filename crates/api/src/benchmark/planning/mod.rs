@@ -8,10 +8,10 @@ use super::thread_pool;
 use crate::error::Error;
 use crate::output_files::OutputFiles;
 use crate::output_folder::OutputLock;
-use rayon::prelude::*;
 use second_insertion::{PlanningCase, run_case};
 use std::path::Path;
 use stylet_examine::{CaseId, Hide, Wrong};
+use stylet_stats::parallel::*;
 use summary_table::write_table;
 
 /// Upper bound of simulated cases per open case wanted.

@@ -8,7 +8,6 @@ mod diagnosis;
 
 use crate::repeated_insertions::segmented_recording::SegmentedRecording;
 use crate::repeated_insertions::start_values::indentation_prior;
-use rayon::prelude::*;
 use serde::Serialize;
 use std::sync::Arc;
 use stylet_identify::block_averages::BlockAverages;
@@ -17,6 +16,7 @@ use stylet_identify::insertion_phases::noise_n;
 use stylet_identify::likelihood::{FitData, residuals};
 use stylet_identify::model::{EffectTerm, Model};
 use stylet_identify::noise::Noise;
+use stylet_stats::parallel::*;
 use stylet_stats::{mean, median_of, rms, sd, student_t};
 use stylet_tissue::{AnyEffect, Effect, NonlinearElasticity, PronyTerm, StressRelaxation, Tissue};
 

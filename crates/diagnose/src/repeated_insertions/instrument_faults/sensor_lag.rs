@@ -10,8 +10,8 @@
 
 use super::air_baseline::least_squares;
 use crate::repeated_insertions::segmented_recording::SegmentedRecording;
-use rayon::prelude::*;
 use stylet_record::Recording;
+use stylet_stats::parallel::*;
 use stylet_stats::{interpolate, sd, student_t};
 
 /// Window (s) before and after the corner.

@@ -1,7 +1,7 @@
 //! Distributions of drawn quantities. Each is sampled by its quantile function, so that every sampling design can be used.
 
+use crate::load_ron::FieldError;
 use serde::{Deserialize, Serialize};
-use stylet_scenario::FieldError;
 
 /// A distribution in the unit of the field that it is drawn for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -3,9 +3,10 @@
 //! The scenario's types define which fields exist: the scenario is serialised to a JSON tree and the path is followed in it. A missing
 //! optional field is validated by deserialising the tree. A trial deserialises only the sections with drawn fields.
 
+use crate::input_error::closest_name;
+use crate::scenario::Scenario;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
-use stylet_scenario::{Scenario, closest_name};
 
 /// One step of a path.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -289,7 +290,7 @@ fn list(names: &[String]) -> String {
 fn unknown(found: &str, so_far: &str, known: &[String]) -> String {
     let names: Vec<&str> = known.iter().map(String::as_str).collect();
     let within = if so_far.is_empty() { "the scenario".to_owned() } else { format!("`{so_far}`") };
-    if let Some(renamed) = stylet_scenario::renamed_path(found) {
+    if let Some(renamed) = crate::renamed_names::renamed_path(found) {
         return format!("{within} has no field `{found}`: {renamed}");
     }
     let near = closest_name(found, &names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
