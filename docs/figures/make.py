@@ -3,7 +3,7 @@
 
     python3 docs/figures/make.py STYLET            # SVG figures: standard library only
     python3 docs/figures/make.py STYLET --reports  # also the pictures of reports (needs playwright and pillow)
-    STYLET_MEASURED=folder python3 docs/figures/make.py STYLET --measured  # also measured.svg (minutes)
+    STYLET_MEASURED=/folder python3 docs/figures/make.py STYLET --measured  # also measured.svg (minutes; an absolute path)
 
 Writes into the folder of this file: one picture per effect (effects/NAME.svg), the moving first picture (needle.svg), the figures of runs and
 diagnoses with fewer points, and with --reports the pictures in report/. Figures that take minutes are made by the commands named on their pages.
