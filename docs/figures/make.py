@@ -3,6 +3,7 @@
 
     python3 docs/figures/make.py STYLET            # SVG figures: standard library only
     python3 docs/figures/make.py STYLET --reports  # also the pictures of reports (needs playwright and pillow)
+    STYLET_MEASURED=/folder python3 docs/figures/make.py STYLET --measured  # also measured.svg (minutes; an absolute path)
 
 Writes into the folder of this file: one picture per effect (effects/NAME.svg), the moving first picture (needle.svg), the figures of runs and
 diagnoses with fewer points, and with --reports the pictures in report/. Figures that take minutes are made by the commands named on their pages.
@@ -291,6 +292,12 @@ def figures_of_commands(stylet):
         (HERE / f"{name}.svg").write_text(smaller(text, tolerance))
 
 
+def figure_of_measured_insertions(stylet):
+    """The held-out errors of the measured insertions, without a measured curve."""
+    stylet("diagnose", "scenarios/measured/skin_on_muscle.ron", "--out", "measured")
+    (HERE / "measured.svg").write_text((stylet.folder / "measured/gain.svg").read_text())
+
+
 def pictures_of_reports(stylet):
     import reports
 
@@ -305,6 +312,8 @@ if __name__ == "__main__":
         effects(command)
         moving_needle(command)
         figures_of_commands(command)
+        if "--measured" in sys.argv:
+            figure_of_measured_insertions(command)
         if "--reports" in sys.argv:
             pictures_of_reports(command)
     for file in sorted(HERE.rglob("*.svg")):
