@@ -26,10 +26,10 @@ done
 target="${CARGO_TARGET_DIR:-$root/target}"
 export CARGO_TARGET_DIR="$target" CARGO_INCREMENTAL=0
 # Those of .cargo/config.toml, which packages that are built elsewhere do not see; so that they share the build.
-export CARGO_BUILD_RUSTFLAGS="-C no-vectorize-slp"
-# Archives of one commit have the same bytes.
-SOURCE_DATE_EPOCH=$(git log -1 --format=%ct)
-export SOURCE_DATE_EPOCH
+export RUSTFLAGS="-C no-vectorize-slp"
+# Time of the files in archives, so that archives of one commit have the same bytes. Not exported as SOURCE_DATE_EPOCH: C libraries
+# would be compiled again.
+commit_time=$(git log -1 --format=%ct)
 version=$(sed -n '/^\[workspace.package\]/,/^\[/s/^version = "\(.*\)"/\1/p' Cargo.toml)
 for file in CITATION.cff packaging/conda/recipe.yaml packaging/ros2/stylet_ros/package.xml; do
     grep -Eq "^ *<?version(: |>)\"?$version\b" "$file" || { echo "$file: has another version than Cargo.toml, $version" >&2; exit 1; }
@@ -45,10 +45,13 @@ skip() { echo "$1" >"$note/skipped"; exit 77; }
 need() { command -v "$1" >/dev/null 2>&1 || skip "${2:-$1} is not installed"; }
 made() { echo "$1" >>"$note/files"; }
 installed() { echo "$1" >"$note/how"; }
-hash_is() { echo "$1" >>"$note/hashes"; }
+hash_is() {
+    [ ${#1} = 32 ] || { echo "no hash, but '$1'"; exit 1; }
+    echo "$1" >>"$note/hashes"
+}
 # A reproducible archive of a folder.
 pack() {
-    tar --sort=name --owner=0 --group=0 --numeric-owner --mtime="@$SOURCE_DATE_EPOCH" -C "$(dirname "$1")" -cf - "$(basename "$1")" | gzip -9n >"$2"
+    tar --sort=name --owner=0 --group=0 --numeric-owner --mtime="@$commit_time" -C "$(dirname "$1")" -cf - "$(basename "$1")" | gzip -9n >"$2"
     made "$2"
 }
 # Hash of the enhanced force that a command makes of the scenario: hash_of_command FOLDER STYLET...

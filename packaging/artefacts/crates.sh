@@ -1,6 +1,6 @@
 # Every published crate. The command is built from the packed crates alone, as it will be from a registry.
 make() {
-    bash .ci/package.sh --list --quiet
+    bash .ci/package.sh --list
     mkdir -p "$out/crates"
     cp "$target"/package/*-"$version".crate "$out/crates/"
     for file in "$out"/crates/*.crate; do made "$file"; done

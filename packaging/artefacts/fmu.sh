@@ -6,7 +6,7 @@ make() {
     crates/capi/install.sh "$prefix"
     local model
     for model in enhancer tissue; do
-        "$python" packaging/fmu/build.py "$model" "$prefix" "$out/stylet-$model-$version.fmu"
+        SOURCE_DATE_EPOCH=$commit_time "$python" packaging/fmu/build.py "$model" "$prefix" "$out/stylet-$model-$version.fmu"
         made "$out/stylet-$model-$version.fmu"
     done
 }

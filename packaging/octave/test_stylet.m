@@ -24,7 +24,7 @@ function test_stylet(recording, bytes)
   assert(all(out.used) && out.ruptures(end) == sum(out.ruptured));
 
   assert_error(@() StyletEnhancer(struct('forgetting', 2)), 'forgetting');
-  assert_error(@() StyletEnhancer(struct('forgeting', 0.9)), 'forgeting');
+  assert_error(@() StyletEnhancer(struct('colour', 1)), 'colour');
   assert_error(@() core.step(t, z, v, f(1:3)), 'equal length');
   delete(core);
   assert_error(@() core.step(0, 0, 0, 0), 'handle');
