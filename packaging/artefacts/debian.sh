@@ -1,12 +1,16 @@
 # Debian package of the command.
 . packaging/prefix_tree.sh
 deb() { echo "$out/stylet_$version-1_$(dpkg --print-architecture).deb"; }
+maintainer="The Stylet developers <noreply@stylet.invalid>"
 make() {
     need dpkg-deb
     need dpkg-shlibdeps dpkg-dev
     local tree="$clean/tree" depends
     prefix_tree "$tree/usr"
-    gzip -9n "$tree"/usr/share/man/man1/*.1 "$tree/usr/share/doc/stylet/CHANGELOG.md"
+    mv "$tree/usr/share/doc/stylet/CHANGELOG.md" "$tree/usr/share/doc/stylet/changelog"
+    printf 'stylet (%s-1) unstable; urgency=low\n\n  * Release %s; see changelog.gz.\n\n -- %s  %s\n' "$version" "$version" "$maintainer" \
+        "$(date -R -u -d "@$commit_time")" >"$tree/usr/share/doc/stylet/changelog.Debian"
+    gzip -9n "$tree"/usr/share/man/man1/*.1 "$tree"/usr/share/doc/stylet/changelog*
     # The package's file of that name is what Debian expects; the others are its source.
     rm "$tree"/usr/share/doc/stylet/LICENSE-*
     cat >"$tree/usr/share/doc/stylet/copyright" <<END
@@ -32,7 +36,7 @@ END
 Package: stylet
 Version: $version-1
 Architecture: $(dpkg --print-architecture)
-Maintainer: The Stylet developers <noreply@stylet.invalid>
+Maintainer: $maintainer
 Installed-Size: $(du -sk "$tree/usr" | cut -f1)
 Depends: $depends
 Section: science
@@ -44,7 +48,7 @@ Description: testbed for robot-assisted needle insertion
 END
     (cd "$tree" && find usr -type f -print0 | sort -z | xargs -0 md5sum >DEBIAN/md5sums)
     chmod -R u=rwX,go=rX "$tree"
-    dpkg-deb --root-owner-group --build "$tree" "$(deb)"
+    SOURCE_DATE_EPOCH=$commit_time dpkg-deb --root-owner-group --build "$tree" "$(deb)"
     made "$(deb)"
     rm -r "$tree"
 }

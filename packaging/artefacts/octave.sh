@@ -10,7 +10,7 @@ check() {
     need mkoctfile octave-dev
     crates/capi/install.sh "$clean/prefix"
     tar -xzf "$out/stylet-matlab-$version.tar.gz" -C "$clean"
-    (cd "$clean/stylet-matlab-$version" && octave-cli --no-init-file --eval "stylet_build('$clean/prefix'); test_stylet('$recording', '$clean/bytes')")
+    (cd "$clean/stylet-matlab-$version" && octave-cli --norc --eval "stylet_build('$clean/prefix'); test_stylet('$recording', '$clean/bytes')")
     hash_is "$(sha256sum <"$clean/bytes" | cut -c1-32)"
     installed "unpacked, compiled and run by $(octave-cli --version | head -1 | sed 's/, version//')"
 }
