@@ -37,7 +37,8 @@ fn the_forces_are_bitwise_those_of_rust() {
         // In, and halfway out again.
         let (time_s, velocity_mps) = (f64::from(k) * 0.002, if k < 20_000 { 0.0026 } else { -0.005 });
         let position_m = if k < 20_000 { -0.005 + 0.0026 * time_s } else { 0.099 - 0.005 * (time_s - 40.0) };
-        let mut c = StyletForce { total_n: 0.0, elastic_n: 0.0, friction_n: 0.0, tip_n: 0.0, active_layer: 0 };
+        let mut c =
+            StyletForce { total_n: 0.0, elastic_n: 0.0, friction_n: 0.0, tip_n: 0.0, active_layer: 0 };
         // SAFETY: a live tissue and a place for the force.
         let status = unsafe { stylet_tissue_step(tissue, time_s, position_m, velocity_mps, &mut c) };
         assert_eq!(status, StyletStatus::StyletOk);

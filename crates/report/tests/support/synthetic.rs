@@ -91,7 +91,7 @@ pub fn synthetic_run(combinations: usize) -> RunReport {
                 .into(),
             command: "stylet run scenarios/three_layer_latex_constant.ron --seed 1".into(),
             seed: Some(1),
-            version: "0.2.0".into(),
+            version: "0.1.0".into(),
             hash: "9f86d081884c7d65".into(),
         },
         notes: Vec::new(),
