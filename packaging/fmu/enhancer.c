@@ -1,5 +1,6 @@
 /* The online core as an FMU. */
 #include "slave.h"
+#include <math.h>
 #include <stdlib.h>
 
 void *model_new(Values values, const char **why) {
@@ -23,6 +24,8 @@ void *model_new(Values values, const char **why) {
         free(memory);
         return NULL;
     }
+    /* Before the first sample. */
+    values.real[LOW_N] = values.real[HIGH_N] = values.real[CONTACT_M] = NAN;
     return core;
 }
 

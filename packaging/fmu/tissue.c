@@ -11,6 +11,8 @@ void *model_new(Values values, const char **why) {
         const double *given = values.real + LAYER_1_THICKNESS_M + k * VALUES_PER_LAYER;
         if (given[0] != 0.0) layers[count++] = (StyletLayer){given[0], given[1], given[2], given[3]};
     }
+    /* Before the first sample. */
+    values.integer[ACTIVE_LAYER] = 1;
     return stylet_tissue_new(layers, count, values.real[SURFACE_M], &tissue, why) == STYLET_OK ? tissue : NULL;
 }
 
