@@ -4,7 +4,7 @@
 # OUT gets the artefacts, `table.md` and `logs/`. ARTEFACT is a name of packaging/artefacts; without any, all are made. The exit code
 # is 1 when an artefact cannot be made or installed, or gives another result. What needs a program that is not here is reported as
 # not tested. Needs a Rust toolchain, a C compiler and Python with venv; cmake, octave-dev, ROS 2, docker or podman, and
-# rattler-build test more. One release build is shared by all, in the target folder of Cargo.
+# rattler-build test more. The release build in the target folder of Cargo is shared by all but the sdist.
 set -euo pipefail
 if [ "${1:-}" != --dry-run ] || [ -z "${2:-}" ]; then
     sed -n '2,7s/^# //p' "$0" >&2

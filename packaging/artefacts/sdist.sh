@@ -6,7 +6,9 @@ make() {
 }
 check() {
     python3 -m venv "$clean/env"
-    "$clean/env/bin/pip" install --quiet --disable-pip-version-check "$clean"/sdist/*.tar.gz
+    # In a target folder of its own: Cargo knows workspace members by their path below the root, and would take the repository's objects
+    # for those of the unpacked sources.
+    CARGO_TARGET_DIR="$clean/target" "$clean/env/bin/pip" install --quiet --disable-pip-version-check "$clean"/sdist/*.tar.gz
     (cd "$clean" && hash_is "$("$clean/env/bin/python" "$root/packaging/python_hash.py" "$root/scenarios/three_layers.ron")")
     installed "pip, compiled in an empty environment"
 }
