@@ -14,6 +14,7 @@ cp "$target/release/libstylet.a" "$prefix/lib/"
 for shared in "$target"/release/libstylet.so "$target"/release/libstylet.dylib; do
     [ -e "$shared" ] && cp "$shared" "$prefix/lib/"
 done
-sed -e "s|@PREFIX@|$prefix|; s|@VERSION@|$version|" crates/capi/stylet.pc.in >"$prefix/lib/pkgconfig/stylet.pc"
+sed "s|@VERSION@|$version|" crates/capi/stylet.pc.in >"$prefix/lib/pkgconfig/stylet.pc"
+sed "s|@VERSION@|$version|" crates/capi/cmake/StyletConfigVersion.cmake.in >"$prefix/lib/cmake/Stylet/StyletConfigVersion.cmake"
 cp crates/capi/cmake/StyletConfig.cmake "$prefix/lib/cmake/Stylet/"
 echo "stylet $version is under $prefix: cc loop.c \$(pkg-config --cflags --libs stylet)"

@@ -3,6 +3,7 @@ get_filename_component(_stylet_prefix "${CMAKE_CURRENT_LIST_DIR}/../../.." ABSOL
 if(NOT TARGET Stylet::stylet)
     add_library(Stylet::stylet SHARED IMPORTED)
     set_target_properties(Stylet::stylet PROPERTIES
+        IMPORTED_NO_SONAME TRUE
         IMPORTED_LOCATION "${_stylet_prefix}/lib/libstylet${CMAKE_SHARED_LIBRARY_SUFFIX}"
         INTERFACE_INCLUDE_DIRECTORIES "${_stylet_prefix}/include")
     add_library(Stylet::stylet_static STATIC IMPORTED)

@@ -1,9 +1,9 @@
-/* The online core of Stylet for control loops: no allocation, caller's memory. Research software, not a medical device. */
+/* The online core of Stylet for control loops (no allocation, caller's memory), and the force of layered tissue. Research software, not a medical device. */
 
 #ifndef STYLET_H
 #define STYLET_H
 
-/* Generated from src/lib.rs by cbindgen; do not edit. `cargo test -p stylet-capi -- --ignored` regenerates it. */
+/* Generated from src by cbindgen; do not edit. `cargo test -p stylet-capi -- --ignored` regenerates it. */
 
 #include <stdarg.h>
 #include <stdbool.h>
@@ -21,7 +21,7 @@ typedef enum StyletStatus {
   STYLET_NULL = -1,
   // The memory is too small: `stylet_size(samples)` bytes are needed.
   STYLET_TOO_SMALL = -2,
-  // A value of the configuration is not finite or out of range; the message of `stylet_init` names it.
+  // A value of the configuration or of a layer is not finite or out of range; the message names it.
   STYLET_BAD_CONFIG = -3,
   // Internal error; the core must not be used any more.
   STYLET_INTERNAL = -4,
@@ -63,6 +63,9 @@ typedef enum StyletState {
 
 // The core; it occupies `stylet_size` bytes.
 typedef struct StyletCore StyletCore;
+
+// A tissue and which of its layers are ruptured; `stylet_tissue_new` allocates it.
+typedef struct StyletTissue StyletTissue;
 
 // Configuration. Fill it with `stylet_default_config`, then change fields.
 typedef struct StyletConfig {
@@ -134,6 +137,32 @@ typedef struct StyletOutput {
   int32_t restarted;
 } StyletOutput;
 
+// A layer of a tissue.
+typedef struct StyletLayer {
+  // Thickness in m, above 0.
+  double thickness_m;
+  // Stiffness in N/m, zero or positive.
+  double stiffness_n_per_m;
+  // Friction per metre of needle inside the layer in N s/m^2, zero or positive.
+  double friction_ns_per_m2;
+  // Elastic force in N at which the layer ruptures; zero: it ruptures at its far face.
+  double puncture_n;
+} StyletLayer;
+
+// Force of a tissue on the needle.
+typedef struct StyletForce {
+  // Force at the needle's base in N, positive when it resists the insertion.
+  double total_n;
+  // Elastic force of the active layer in N.
+  double elastic_n;
+  // Friction along the shaft in N.
+  double friction_n;
+  // Force at the tip in N: `total_n` less the friction of the ruptured layers.
+  double tip_n;
+  // Active layer, from 1; one more than the number of layers after the last rupture.
+  uint32_t active_layer;
+} StyletForce;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -183,6 +212,62 @@ enum StyletStatus stylet_step(struct StyletCore *core,
 // # Safety
 // `core` is null or from `stylet_init`, and its memory is still valid.
 const char *stylet_last_error(const struct StyletCore *core);
+
+// Creates a tissue of `count` layers, whose front face is at `surface_m`. `*tissue` is the handle, to be freed with
+// `stylet_tissue_free`. If `why` is not null, `*why` is set to a static message, empty on success.
+//
+// # Safety
+// `layers` is null or points to `count` layers; `tissue` is null or points to a pointer; so does `why`.
+enum StyletStatus stylet_tissue_new(const struct StyletLayer *layers,
+                                    size_t count,
+                                    double surface_m,
+                                    struct StyletTissue **tissue,
+                                    const char **why);
+
+// Force at a sample: time in s (not decreasing), tip position in m (positive into the tissue), tip velocity in m/s. A layer that has
+// ruptured stays ruptured. Allocates nothing. A sample that is not finite gives NaN and changes nothing.
+//
+// # Safety
+// `tissue` is null or from `stylet_tissue_new` and not freed; `force` is null or points to a `StyletForce`.
+enum StyletStatus stylet_tissue_step(struct StyletTissue *tissue,
+                                     double time_s,
+                                     double position_m,
+                                     double velocity_mps,
+                                     struct StyletForce *force);
+
+// Frees a tissue; null is ignored.
+//
+// # Safety
+// `tissue` is null or from `stylet_tissue_new` and not freed yet.
+void stylet_tissue_free(struct StyletTissue *tissue);
+
+// Creates a tissue of `count` layers, whose front face is at `surface_m`. `*tissue` is the handle, to be freed with
+// `stylet_tissue_free`. If `why` is not null, `*why` is set to a static message, empty on success.
+//
+// # Safety
+// `layers` is null or points to `count` layers; `tissue` is null or points to a pointer; so does `why`.
+enum StyletStatus stylet_tissue_new(const struct StyletLayer *layers,
+                                    size_t count,
+                                    double surface_m,
+                                    struct StyletTissue **tissue,
+                                    const char **why);
+
+// Force at a sample: time in s (not decreasing), tip position in m (positive into the tissue), tip velocity in m/s. A layer that has
+// ruptured stays ruptured. Allocates nothing. A sample that is not finite gives NaN and changes nothing.
+//
+// # Safety
+// `tissue` is null or from `stylet_tissue_new` and not freed; `force` is null or points to a `StyletForce`.
+enum StyletStatus stylet_tissue_step(struct StyletTissue *tissue,
+                                     double time_s,
+                                     double position_m,
+                                     double velocity_mps,
+                                     struct StyletForce *force);
+
+// Frees a tissue; null is ignored.
+//
+// # Safety
+// `tissue` is null or from `stylet_tissue_new` and not freed yet.
+void stylet_tissue_free(struct StyletTissue *tissue);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -1,14 +1,19 @@
 //! The online core for C and C++ control loops.
 //!
 //! The caller provides the memory: [`stylet_size`] bytes, aligned to [`stylet_align`], hold the core and the samples of a layer.
-//! Nothing allocates, and panics do not unwind into C: a panic (a bug in this library) makes the call return `STYLET_INTERNAL`. A
+//! The core allocates nothing, and panics do not unwind into C: a panic (a bug in this library) makes the call return `STYLET_INTERNAL`. A
 //! core must not be used from two threads at once; separate cores are independent.
 //!
-//! `include/stylet.h` is generated from this file by cbindgen; `tests/header.rs` checks that it is up to date.
+//! `include/stylet.h` is generated from these files by cbindgen; `tests/header.rs` checks that it is up to date.
+
+mod tissue;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use stylet_core::config::{Algorithm, Contact, EnhanceConfig, Model};
 use stylet_core::{Enhancer, Output, Sample, UnusedReason};
+pub use tissue::{
+    StyletForce, StyletLayer, StyletTissue, stylet_tissue_free, stylet_tissue_new, stylet_tissue_step,
+};
 
 /// Status of a call.
 #[repr(C)]
@@ -22,7 +27,7 @@ pub enum StyletStatus {
     StyletNull = -1,
     /// The memory is too small: `stylet_size(samples)` bytes are needed.
     StyletTooSmall = -2,
-    /// A value of the configuration is not finite or out of range; the message of `stylet_init` names it.
+    /// A value of the configuration or of a layer is not finite or out of range; the message names it.
     StyletBadConfig = -3,
     /// Internal error; the core must not be used any more.
     StyletInternal = -4,

@@ -5,8 +5,11 @@ use std::path::Path;
 fn generated() -> String {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = cbindgen::Config::from_file(root.join("cbindgen.toml")).expect("a configuration");
-    let source = root.join("src/lib.rs");
-    let header = cbindgen::Builder::new().with_config(config).with_src(source).generate().expect("a header");
+    let sources = cbindgen::Builder::new()
+        .with_config(config)
+        .with_src(root.join("src/lib.rs"))
+        .with_src(root.join("src/tissue.rs"));
+    let header = sources.generate().expect("a header");
     let mut text = Vec::new();
     header.write(&mut text);
     String::from_utf8(text).expect("text")

@@ -8,7 +8,7 @@ use crate::effects::Custom;
 use crate::formula_equation::{FormulaEquation, TRAVEL, VARIABLES, value_unit};
 use alloc::boxed::Box;
 use alloc::format;
-use alloc::string::{String, ToString};
+use alloc::string::String;
 use alloc::vec::Vec;
 use stylet_formula::{Formula, FormulaError, Unit, solve_unknown_units};
 
@@ -332,6 +332,7 @@ impl serde::Serialize for Custom {
 #[cfg(feature = "serde")]
 impl<'de> serde::Deserialize<'de> for Custom {
     fn deserialize<D: serde::Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        use alloc::string::ToString;
         use serde::de::Error;
         let text = CustomText::deserialize(from)?;
         Self::from_text(&text).map_err(|e| D::Error::custom(e.to_string()))
