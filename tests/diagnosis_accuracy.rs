@@ -251,7 +251,7 @@ fn friction_and_surface_of_another_needle_are_refitted() {
 }
 
 /// Insertions of one group and a model of them that lacks the dry friction: the misfit is part of the band, no refit makes it
-/// worse, and the mean curve of the recordings is named as better than a model without its mean residual.
+/// worse, and the mean curve of the recordings is named as better than a model of half the stiffness.
 #[test]
 fn the_band_of_a_model_holds_the_recordings_that_made_it_and_a_refit_moves_nothing() {
     let segments = || {

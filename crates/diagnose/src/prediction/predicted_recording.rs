@@ -55,6 +55,8 @@ pub struct PredictionCurves {
     pub high_n: Vec<f64>,
     /// Edges (N) of the other band: that of an unseen group for recordings of the same group, and the other way round.
     pub other_band_n: Option<(Vec<f64>, Vec<f64>)>,
+    /// Whether the band is that of an unseen group.
+    pub is_unseen_group: bool,
     /// Whether the block is compared.
     pub used: Vec<bool>,
     /// Rupture times of the model in s.
@@ -231,6 +233,7 @@ pub fn predict_one(
         low_n,
         high_n,
         other_band_n,
+        is_unseen_group: !varying.is_empty(),
         used: b.used.clone(),
         ruptures_s: law.rupture_times_s.iter().copied().filter(|t| *t < NO_RUPTURE).collect(),
     };

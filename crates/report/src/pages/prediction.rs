@@ -126,7 +126,7 @@ pub fn worse_than_baseline(p: &Prediction) -> Vec<String> {
 fn baseline_name(name: &str) -> &'static str {
     match name {
         "mean_curve" => "the mean curve of the recordings that made it at this speed",
-        _ => "the mean curve of those at other speeds, by depth and hold",
+        _ => "the mean curve of the recordings that made it at other speeds, by depth and hold",
     }
 }
 
@@ -236,9 +236,10 @@ fn force(r: &RecordingPrediction, s: &PredictionCurves) -> Chart {
     if let Some(before) = &s.assumed_n {
         chart = chart.with_series(line("assumed scenario", Colour::Vermillion, before).width(1.0));
     }
+    let other = if s.is_unseen_group { "band of the same group" } else { "band of an unseen group" };
     if let Some((low, high)) = &s.other_band_n {
         for edge in [low, high] {
-            chart = chart.with_series(line("band of the other group", Colour::Grey, edge).width(0.6));
+            chart = chart.with_series(line(other, Colour::Grey, edge).width(0.6));
         }
     }
     chart
