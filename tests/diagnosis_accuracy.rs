@@ -1,7 +1,7 @@
 //! Accuracy of the diagnosis on cases of the independent simulator: no false positives on clean data, and most strong effects are
 //! identified. A sample of `stylet benchmark diagnose`; the longest are run by `tests/accuracy.sh`.
 
-use stylet_diagnose::prediction::{Refit, predict};
+use stylet_diagnose::prediction::{Factor, PredictionOptions, Refit, predict, training_summary};
 use stylet_diagnose::{NamedRecording, Options};
 use stylet_examine::{
     Answer, CaseId, Hide, Plan, Question, Severity, Size, World, Wrong, results_table, run_cases,
@@ -201,8 +201,10 @@ fn the_model_of_a_diagnosis_predicts_a_held_out_recording_to_about_its_noise() {
             |_| {},
         )
         .expect("a diagnosis");
-        let predicted = predict(&found.extended_scenario, Some(&found.diagnosis), Some(&assumed), &[], &kept)
-            .expect("a prediction");
+        let options = PredictionOptions { varying: Some(Vec::new()), ..PredictionOptions::default() };
+        let predicted =
+            predict(&found.extended_scenario, Some(&found.diagnosis), Some(&assumed), &options, &kept)
+                .expect("a prediction");
         let p = &predicted.prediction;
         println!("{:?}: {p:?}", case.setup.effects);
         assert!(p.rmse_n < 1.25 * p.floor_n && p.held_out, "{p:?}");
@@ -232,9 +234,13 @@ fn friction_and_surface_of_another_needle_are_refitted() {
     };
     let recordings = [other(1, 0.004), other(2, 0.003)];
     let both = [Refit::Surface, Refit::Friction];
-    let without = predict(&model, None, None, &[], &recordings).expect("a prediction").prediction;
+    let none = PredictionOptions::default();
+    let both = PredictionOptions { refit: both.to_vec(), ..none.clone() };
+    let without = predict(&model, None, None, &none, &recordings).expect("a prediction").prediction;
     let with = predict(&model, None, None, &both, &recordings).expect("a prediction").prediction;
-    assert!(without.rmse_n > 3.0 * without.floor_n && without.band_coverage < 0.6, "{without:?}");
+    let coverage = without.coverage_by_group.expect("without a refit");
+    assert!(without.rmse_n > 3.0 * without.floor_n && coverage.same < 0.6, "{without:?}");
+    assert!(coverage.unseen > 0.85 && without.varying == Factor::ALL, "{without:?}");
     assert!(with.rmse_n < 1.15 * with.floor_n && with.band_coverage > 0.8 && with.held_out, "{with:?}");
     for r in &with.recordings {
         let (shift, factor) = (r.surface_shift_m.expect("a shift"), r.friction_factor.expect("a factor"));
@@ -242,6 +248,58 @@ fn friction_and_surface_of_another_needle_are_refitted() {
     }
     let alone = predict(&model, None, None, &both, &recordings[..1]).expect("a prediction").prediction;
     assert!(!alone.held_out && alone.rmse_n < 1.15 * alone.floor_n, "{alone:?}");
+}
+
+/// Insertions of one group and a model of them that lacks the dry friction: the misfit is part of the band, no refit makes it
+/// worse, and the mean curve of the recordings is named as better than a model of half the stiffness.
+#[test]
+fn the_band_of_a_model_holds_the_recordings_that_made_it_and_a_refit_moves_nothing() {
+    let segments = || {
+        let velocity_mps = 0.004;
+        vec![
+            Segment::Move { velocity_mps, duration_s: 8.0 },
+            Segment::Hold { duration_s: 2.0 },
+            Segment::Move { velocity_mps: -velocity_mps, duration_s: 8.0 },
+        ]
+    };
+    let friction = |c: f64| -> Vec<AnyEffect> { vec![CoulombFriction { c_n_per_m: c }.into()] };
+    let runs: Vec<(Scenario, NamedRecording)> =
+        (1..=8).map(|k| two_gels(friction(8.0 + 0.6 * (k % 4) as f64), segments(), k)).collect();
+    let recordings: Vec<NamedRecording> = runs.iter().map(|(_, r)| r.clone()).collect();
+    let (made, new) = recordings.split_at(5);
+    let model = &runs[0].0;
+    let brief = Options { brief: true, ..Options::default() };
+    let mut d =
+        stylet_diagnose::diagnose(model, &recordings[..1], &brief, |_| {}).expect("a diagnosis").diagnosis;
+    d.training = training_summary(model, &d, made);
+    let run = |options: &PredictionOptions, on: &[NamedRecording]| {
+        predict(model, Some(&d), None, options, on).expect("a prediction").prediction
+    };
+    let (none, all) = (
+        PredictionOptions::default(),
+        PredictionOptions { refit: Refit::ALL.to_vec(), ..Default::default() },
+    );
+    let own = run(&none, made);
+    println!("{own:?}");
+    assert!(own.varying.is_empty() && own.recordings.iter().all(|r| r.made_the_law), "{own:?}");
+    assert!((0.85..=0.97).contains(&own.band_coverage), "{own:?}");
+    let refitted = run(&all, made);
+    assert!(!refitted.refit.as_ref().expect("a refit").moved, "{refitted:?}");
+    assert_eq!(refitted.rmse_n, own.rmse_n);
+    // Recordings of the same group that did not make it: little to gain, nothing to lose.
+    let (plain, refitted) = (run(&none, new), run(&all, new));
+    assert_eq!(plain.varying, Factor::ALL);
+    assert!(refitted.rmse_n <= 1.03 * plain.rmse_n, "{refitted:?}");
+    let one = PredictionOptions { refit_on: new[..1].to_vec(), ..all };
+    let (plain, refitted) = (run(&none, &new[1..]), run(&one, &new[1..]));
+    assert!(refitted.rmse_n <= 1.03 * plain.rmse_n && refitted.held_out, "{refitted:?}");
+    // Half the stiffness: the mean curve is better.
+    let mut poor = model.clone();
+    poor.tissue.layers.iter_mut().for_each(|l| l.stiffness_n_per_m *= 0.5);
+    let worse = predict(&poor, Some(&d), None, &none, new).expect("a prediction").prediction;
+    let mean = worse.baselines.iter().find(|b| b.name == "mean_curve").expect("a mean curve");
+    assert!(mean.prediction_is_worse && mean.rmse_n < 0.5 * mean.prediction_rmse_n, "{worse:?}");
+    assert!(plain.baselines.iter().all(|b| !b.prediction_is_worse), "{plain:?}");
 }
 
 /// Two gels, replayed with these effects at the given speeds.

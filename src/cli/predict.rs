@@ -1,13 +1,17 @@
 //! `stylet predict`: held-out recordings predicted by a model.
 
-use crate::cli::args::{PredictArgs, RefitArg};
+use crate::cli::args::{PredictArgs, RefitArg, SameArg};
 use crate::cli::exit_codes::Failure;
 use std::fmt::Write as _;
 use stylet_api::output_folder::{check_folder, recover_parent};
 use stylet_api::prediction_files::{ModelOrigin, output_files};
-use stylet_api::{Prediction, Refit, read_options, read_recordings, resource_estimate};
+use stylet_api::{
+    Factor, Prediction, PredictionOptions, Refit, read_options, read_recordings, resource_estimate,
+};
 use stylet_report::pages::formatting::significant_or_dash;
-use stylet_report::pages::prediction::summary_sentence;
+use stylet_report::pages::prediction::{
+    group_sentence, refit_sentence, summary_sentence, worse_than_baseline,
+};
 use stylet_report::significant;
 use stylet_scenario::Scenario;
 
@@ -20,27 +24,57 @@ pub fn predict(args: &PredictArgs) -> Result<(), Failure> {
     let model = Scenario::load(&args.model)?;
     args.limits.check(&args.model, &resource_estimate::estimate_predict(&args.data), args.results.quiet)?;
     let folder = args.results.output_folder(&args.model, "-prediction");
-    let read = args.results.inputs(&args.model, args.data.iter().chain(&args.columns).chain(&args.assumed));
+    let read = args.results.inputs(
+        &args.model,
+        args.data.iter().chain(&args.refit_on).chain(&args.columns).chain(&args.assumed),
+    );
     check_folder(&folder, "predict.json", &read)?;
     let ModelOrigin { diagnosis, assumed } =
         ModelOrigin::of_model_file(&args.model, args.assumed.as_deref())?;
-    let recordings = read_recordings(&args.data, &read_options(args.columns.as_deref(), args.repair)?)?;
-    let refit: Vec<Refit> = args
-        .refit
-        .iter()
-        .map(|a| match a {
-            RefitArg::Friction => Refit::Friction,
-            RefitArg::Surface => Refit::Surface,
-        })
-        .collect();
+    let read_options = read_options(args.columns.as_deref(), args.repair)?;
+    let recordings = read_recordings(&args.data, &read_options)?;
+    let options = PredictionOptions {
+        refit: refitted_parameters(args),
+        refit_on: read_recordings(&args.refit_on, &read_options)?,
+        varying: varying_factors(args),
+    };
     let found =
-        stylet_api::predict_recordings(&model, diagnosis.as_ref(), assumed.as_ref(), &refit, &recordings)?;
+        stylet_api::predict_recordings(&model, diagnosis.as_ref(), assumed.as_ref(), &options, &recordings)?;
     let output = output_files(&model, &args.model, &found)?.with_inputs(read);
     args.results.write_and_print(&folder, &output, || summary(&found.prediction))
 }
 
+fn refitted_parameters(args: &PredictArgs) -> Vec<Refit> {
+    if args.refit.is_empty() && !args.refit_on.is_empty() {
+        return Refit::ALL.to_vec();
+    }
+    let parameter = |a: &RefitArg| match a {
+        RefitArg::Surface => Refit::Surface,
+        RefitArg::Force => Refit::Force,
+        RefitArg::Friction => Refit::Friction,
+        RefitArg::Puncture => Refit::Puncture,
+    };
+    args.refit.iter().map(parameter).collect()
+}
+
+/// What differs from the recordings that made the model; `None` without `--same`.
+fn varying_factors(args: &PredictArgs) -> Option<Vec<Factor>> {
+    let is_same = |f: &Factor| {
+        args.same.iter().any(|s| match s {
+            SameArg::Group => true,
+            SameArg::Needle => *f == Factor::Needle,
+            SameArg::Tissue => *f == Factor::Tissue,
+            SameArg::Setup => *f == Factor::Setup,
+        })
+    };
+    (!args.same.is_empty()).then(|| Factor::ALL.into_iter().filter(|f| !is_same(f)).collect())
+}
+
 fn summary(p: &Prediction) -> String {
-    let mut out = format!("{}\n", summary_sentence(p));
+    let mut out = format!("{}\n{}\n", summary_sentence(p), group_sentence(p));
+    for line in refit_sentence(p).into_iter().chain(worse_than_baseline(p)) {
+        let _ = writeln!(out, "{line}");
+    }
     let _ = writeln!(
         out,
         "\n  {:<24} {:>10} {:>10} {:>12} {:>12}",
@@ -60,8 +94,12 @@ fn summary(p: &Prediction) -> String {
         if let Some(m) = r.surface_shift_m {
             let _ = writeln!(out, "    surface {:+.2} mm", 1e3 * m);
         }
-        if let Some(factor) = r.friction_factor {
-            let _ = writeln!(out, "    friction x {}", significant(factor, 3));
+        for (what, factor) in
+            [("force", r.force_factor), ("friction", r.friction_factor), ("puncture", r.puncture_factor)]
+        {
+            if let Some(factor) = factor {
+                let _ = writeln!(out, "    {what} x {}", significant(factor, 3));
+            }
         }
     }
     let _ = writeln!(
@@ -70,6 +108,9 @@ fn summary(p: &Prediction) -> String {
         significant(p.floor_n, 3),
         p.band_includes.join(", ")
     );
+    for b in &p.baselines {
+        let _ = writeln!(out, "  {}: {} N rms", b.name.replace('_', " "), significant(b.rmse_n, 3));
+    }
     if !p.held_out {
         let _ = writeln!(
             out,

@@ -3,7 +3,7 @@
 use crate::diagnosis_inputs::{DiagnosisInputs, INPUTS_FILE};
 use crate::error::Error;
 use crate::output_files::{OutputFiles, one_line, to_json_bytes};
-use stylet_diagnose::prediction::{PredictionResult, Refit};
+use stylet_diagnose::prediction::{PredictionOptions, PredictionResult, training_summary};
 use stylet_diagnose::{Diagnosis, DiagnosisResult, NamedRecording, Options};
 use stylet_record::{QualityNote, Recording, assess, check_distinct, check_usable, downsample};
 use stylet_scenario::Scenario;
@@ -19,8 +19,10 @@ pub struct DiagnosisReport {
 }
 
 impl DiagnosisReport {
-    fn new(details: DiagnosisResult) -> Self {
-        Self { diagnosis: details.diagnosis.clone(), extended: details.extended_scenario.clone(), details }
+    fn new(details: DiagnosisResult, recordings: &[NamedRecording]) -> Self {
+        let (mut diagnosis, extended) = (details.diagnosis.clone(), details.extended_scenario.clone());
+        diagnosis.training = training_summary(&extended, &diagnosis, recordings);
+        Self { diagnosis, extended, details }
     }
 
     /// `diagnosis.json`.
@@ -91,7 +93,8 @@ pub fn diagnose(
     } else {
         usable_recordings(recordings)?
     };
-    Ok(DiagnosisReport::new(stylet_diagnose::diagnose(assumed, &recordings, options, progress)?))
+    let details = stylet_diagnose::diagnose(assumed, &recordings, options, progress)?;
+    Ok(DiagnosisReport::new(details, &recordings))
 }
 
 /// Finds the layers that recordings show, `layers` of them or as many as there are, and diagnoses what is left: the scenario that it
@@ -108,7 +111,7 @@ pub fn identify(
     let recordings = usable_recordings(recordings)?;
     let (scenario, details) =
         stylet_diagnose::identify(name, &recordings, layers, &Options::default(), progress)?;
-    let mut report = DiagnosisReport::new(details);
+    let mut report = DiagnosisReport::new(details, &recordings);
     // The numbers are known now.
     let usual = Scenario::new(String::new(), scenario.tissue.clone(), scenario.motion.clone());
     report.extended.tolerance = usual.tolerance;
@@ -117,8 +120,7 @@ pub fn identify(
 }
 
 /// Predicts held-out recordings by a model. Noise, scatter and intervals come from the `diagnosis` that gave the model; `assumed` is the
-/// scenario before that diagnosis, for comparison. The parameters in `refit` are fitted to the recordings first; of two or more recordings
-/// each is predicted by the values from the others.
+/// scenario before that diagnosis, for comparison.
 ///
 /// # Errors
 /// As [`diagnose`].
@@ -126,11 +128,12 @@ pub fn predict_recordings(
     model: &Scenario,
     diagnosis: Option<&Diagnosis>,
     assumed: Option<&Scenario>,
-    refit: &[Refit],
+    options: &PredictionOptions,
     recordings: &[NamedRecording],
 ) -> Result<PredictionResult, Error> {
     let recordings = usable_recordings(recordings)?;
-    Ok(stylet_diagnose::prediction::predict(model, diagnosis, assumed, refit, &recordings)?)
+    let options = PredictionOptions { refit_on: usable_recordings(&options.refit_on)?, ..options.clone() };
+    Ok(stylet_diagnose::prediction::predict(model, diagnosis, assumed, &options, &recordings)?)
 }
 
 /// Checks the recordings and downsamples those that are too long.

@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use stylet_core::EnhanceConfig;
 use stylet_core::Sample;
-use stylet_diagnose::Diagnosis;
+use stylet_diagnose::prediction::training_summary;
 use stylet_diagnose::repeated_insertions::SegmentedRecording;
 use stylet_diagnose::repeated_insertions::dataset::{Dataset, DatasetError, find_files, is_dataset};
 use stylet_diagnose::repeated_insertions::diagnose_set::{SetDiagnosis, diagnose_set};
@@ -16,6 +16,7 @@ use stylet_diagnose::repeated_insertions::instrument_faults::ReferenceRecordings
 use stylet_diagnose::repeated_insertions::layer_composition::compose_layers;
 use stylet_diagnose::repeated_insertions::population_prediction::friction_model;
 use stylet_diagnose::repeated_insertions::repeatability_report::{CompositionReport, RepeatabilityReport};
+use stylet_diagnose::{Diagnosis, NamedRecording};
 use stylet_record::{Recording, check_distinct, read_csv};
 use stylet_report::pages::repeated_insertions::{ablation_figure, page};
 use stylet_scenario::Scenario;
@@ -133,6 +134,11 @@ pub fn diagnose_repeats(
         progress("composition of layers measured separately");
         study.report.composition = parts(set, &study, given)?;
     }
+    let named: Vec<NamedRecording> = runs
+        .iter()
+        .map(|r| NamedRecording { name: r.name.clone(), recording: r.recording.clone(), notes: Vec::new() })
+        .collect();
+    study.diagnosis.training = training_summary(&study.mean_scenario, &study.diagnosis, &named);
     let online = study.recordings.iter().enumerate().map(|(i, run)| run_online(run, &study, i)).collect();
     Ok(RepeatsReport { study, online })
 }

@@ -55,7 +55,7 @@ pub use simulate::{Run, settings_note, simulate, simulate_from, virtual_note};
 pub use sweep::{SweepResult, sweep};
 
 pub use stylet_core::{EnhanceConfig, Enhancer, Sample};
-pub use stylet_diagnose::prediction::{Prediction, PredictionResult, Refit};
+pub use stylet_diagnose::prediction::{Factor, Prediction, PredictionOptions, PredictionResult, Refit};
 pub use stylet_diagnose::{Diagnosis, NamedRecording, Options as DiagnoseOptions};
 pub use stylet_plan::Limits;
 pub use stylet_record::{ColumnMap, ReadOptions, Recording, read_csv};

@@ -257,6 +257,7 @@ pub(crate) fn diagnose_given_layers(
         search_steps: search.stages.iter().map(search_step).collect(),
         noise: NoiseReport { sd_n: noise_n, ar: autoregression(&search), from_air: false },
         random_effect_sd: random_effect_sd(&search),
+        training: None,
         causes,
     };
     let context = Context {

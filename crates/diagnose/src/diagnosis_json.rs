@@ -1,6 +1,7 @@
 //! Result of a diagnosis, serialised as `diagnosis.json` (docs/reference/files.md, section "diagnosis.json").
 
 use crate::check_json::{CheckItem, EffectVisibility};
+use crate::prediction::TrainingSummary;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use stylet_record::QualityNote;
@@ -426,4 +427,7 @@ pub struct Diagnosis {
     pub random_effect_sd: RandomEffectSd,
     /// Motions that would separate equivalent effects or show those that are not identifiable.
     pub advice: Vec<String>,
+    /// What the recordings show about the extended scenario, for predictions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub training: Option<TrainingSummary>,
 }

@@ -15,7 +15,7 @@ use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use stylet_diagnose::diagnosis_json::Cause;
-use stylet_diagnose::prediction::{Refit, predict};
+use stylet_diagnose::prediction::{PredictionOptions, Refit, predict};
 use stylet_diagnose::{DiagnosisResult, NamedRecording, Options, Verdict, diagnose};
 use stylet_record::Recording;
 use stylet_scenario::{Motion, Scenario};
@@ -577,11 +577,13 @@ fn predictions_are_reproduced() {
         ("by the diagnosis", Some(d), Some(&base), &[][..]),
         ("by the others", Some(d), None, &[Refit::Surface, Refit::Friction][..]),
     ] {
-        let p = predict(model, d, was, refit, &recordings).expect("a prediction");
+        let options = PredictionOptions { refit: refit.to_vec(), ..PredictionOptions::default() };
+        let p = predict(model, d, was, &options, &recordings).expect("a prediction");
         answers.number(&format!("error {name}"), p.prediction.rmse_n);
         assert!(refit.is_empty() || p.prediction.rmse_n < 0.2, "{:?}", p.prediction);
     }
-    let alone = predict(model, Some(d), None, &[Refit::Friction], &recordings[..1]).expect("a prediction");
+    let friction = PredictionOptions { refit: vec![Refit::Friction], ..PredictionOptions::default() };
+    let alone = predict(model, Some(d), None, &friction, &recordings[..1]).expect("a prediction");
     assert!(!alone.prediction.held_out);
     answers.number("error alone", alone.prediction.rmse_n);
     answers.compare(FILE, "predictions");

@@ -158,8 +158,9 @@ pub fn start_prediction(studio: &mut Studio, request: FilesRequest) -> Result<Va
         let ModelOrigin { diagnosis, assumed } = ModelOrigin::of_model_file(&model, None)?;
         let recordings = inputs.read_recordings()?;
         stage("predicting");
+        let options = stylet_api::PredictionOptions::default();
         let (diagnosis, assumed) = (diagnosis.as_ref(), assumed.as_ref());
-        let found = stylet_api::predict_recordings(&scenario, diagnosis, assumed, &[], &recordings)?;
+        let found = stylet_api::predict_recordings(&scenario, diagnosis, assumed, &options, &recordings)?;
         let output = prediction_files::output_files(&scenario, &model, &found)?;
         stage("writing the results");
         output.write(&folder)?;

@@ -94,12 +94,15 @@ pub struct IdentifyArgs {
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   stylet predict out/diagnosis/extended.ron --data next_day.csv
-  stylet predict out/diagnosis/extended.ron --data d.csv e.csv --refit friction,surface
+  stylet predict out/diagnosis/extended.ron --data d.csv e.csv --refit
+  stylet predict out/diagnosis/extended.ron --data e.csv --refit-on d.csv --same tissue
   stylet predict phantom.ron --data a.csv --out out/phantom
 
-Writes report.html and predict.json: the RMS error per recording, the sensor noise, and the share of
-samples inside the 90 % band. Noise, scatter, intervals and the formerly assumed scenario are taken from
-diagnosis.json and inputs.json in the model's folder. The exit code is 0 however large the error is.")]
+Writes report.html and predict.json: the RMS error per recording, the sensor noise, the share of samples
+inside the 90 % band, and the errors of mean curves without a model. Noise, scatter, intervals, misfit and
+the formerly assumed scenario are taken from diagnosis.json and inputs.json in the model's folder.
+Recordings that did not make the model are taken for another group: another needle, other tissue, another
+set-up; --same narrows the band. The exit code is 0 however large the error is.")]
 pub struct PredictArgs {
     /// Model: extended.ron of a diagnosis, or any scenario (RON).
     pub model: PathBuf,
@@ -109,10 +112,17 @@ pub struct PredictArgs {
     /// Formerly assumed scenario (RON), for comparison [default: the one in the model's inputs.json].
     #[arg(long, value_name = "FILE")]
     pub assumed: Option<PathBuf>,
-    /// Parameters to fit to the new recordings first; of two or more recordings each is predicted by the
-    /// values from the others.
-    #[arg(long, value_name = "PARAMETERS", value_delimiter = ',')]
+    /// Fit the group of the new recordings first, from the model's own values, where that lowers the held-out
+    /// error; of two or more recordings each is predicted by the values from the others [default: all].
+    #[arg(long, value_name = "PARAMETERS", value_delimiter = ',', num_args = 0..=1,
+          default_missing_values = ["surface", "force", "friction", "puncture"])]
     pub refit: Vec<RefitArg>,
+    /// Recordings of the new group to fit it to, instead of those to predict.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub refit_on: Vec<PathBuf>,
+    /// What is the same as when the model was made.
+    #[arg(long, value_name = "FACTORS", value_delimiter = ',')]
+    pub same: Vec<SameArg>,
     /// Column map: names and units of the logs' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
@@ -128,10 +138,27 @@ pub struct PredictArgs {
 /// A parameter that another needle or another day may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum RefitArg {
-    /// Friction: one factor for all layers.
-    Friction,
     /// Position of the surface.
     Surface,
+    /// One factor for all forces.
+    Force,
+    /// Friction: one factor for all layers, beyond that of all forces.
+    Friction,
+    /// Puncture force: one factor for all layers, beyond that of all forces.
+    Puncture,
+}
+
+/// What may be the same as when a model was made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum SameArg {
+    /// Everything: a new recording of the same group.
+    Group,
+    /// The needle.
+    Needle,
+    /// The specimen or batch of the tissue.
+    Tissue,
+    /// The day and the set-up.
+    Setup,
 }
 
 /// Arguments of `stylet check`.

@@ -16,7 +16,7 @@ pub use benchmark::{
 };
 pub use diagnosis::{
     CheckArgs, CompareModelsArgs, DiagnoseArgs, EffectsArgs, IdentifiabilityArgs, IdentifyArgs, PlanArgs,
-    PredictArgs, RefitArg,
+    PredictArgs, RefitArg, SameArg,
 };
 pub use inspect::InspectArgs;
 pub use manual::{CompletionsArgs, ManArgs};

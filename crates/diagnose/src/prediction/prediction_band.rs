@@ -1,5 +1,10 @@
 //! Prediction band of a new recording.
 
+use super::group_deviation::{Factor, Values};
+use super::group_update::GroupEstimate;
+use super::insertion_course::{Curve, value_at};
+use super::prepared::Prepared;
+use super::training_summary::TrainingSummary;
 use crate::diagnosis_json::{Diagnosis, Estimate, LabelledParameter, ParameterLabel, RandomEffectSd};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
@@ -93,12 +98,11 @@ impl Uncertainty {
     }
 
     /// Names of the components.
-    pub fn components(&self) -> Vec<String> {
+    pub fn components(&self, training: Option<&TrainingSummary>, varying: &[Factor]) -> Vec<String> {
         let mut out = vec!["sensor noise".to_owned()];
-        if !self.from_diagnosis {
-            return out;
+        if self.from_diagnosis {
+            out.push("parameter intervals".to_owned());
         }
-        out.push("parameter intervals".to_owned());
         let d = &self.differences;
         for (size, what) in [
             (d.puncture, "scatter of puncture forces"),
@@ -110,7 +114,19 @@ impl Uncertainty {
                 out.push(what.to_owned());
             }
         }
+        if training.is_some() {
+            out.push("misfit of the law".to_owned());
+        }
+        out.extend(varying.iter().map(|f| format!("another {}", f.name())));
         out
+    }
+
+    /// Drawn forces (N) of recording `r` in the law's own group.
+    pub fn draws(&self, prepared: &Prepared, r: usize) -> Vec<Vec<f64>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+        (0..DRAWS)
+            .filter_map(|_| free_run_force(&self.draw(&prepared.model, r, &mut rng), &prepared.data, r))
+            .collect()
     }
 
     /// A draw of the next recording's model.
@@ -162,42 +178,73 @@ fn deviate(effect: &mut AnyEffect, path: &str, deviation: f64) {
     }
 }
 
-/// Prediction band of every recording.
+/// Prediction band of one recording.
 pub struct Band<'a> {
-    /// Uncertainty.
-    pub known: &'a Uncertainty,
-    /// Model.
-    pub model: &'a Model,
-    /// Recordings.
-    pub data: &'a FitData,
+    /// Model and recordings.
+    pub prepared: &'a Prepared,
+    /// What the recordings that made the law show.
+    pub training: Option<&'a TrainingSummary>,
+    /// The recording.
+    pub recording: usize,
+    /// Mean residual of the law (N).
+    pub mean_residual: &'a Curve,
+    /// Place of every block in the course.
+    pub places: &'a [f64],
 }
 
 impl Band<'_> {
-    /// Lower and upper edge (N) per block of recording `r`.
-    pub fn edges(&self, r: usize) -> (Vec<f64>, Vec<f64>) {
+    /// Lower and upper edge (N) per block in a group of recordings about `deviation`. In another group than the law's own
+    /// (`is_unseen`) the mean residual may be missing, and counts as misfit, beside `extra_misfit_n`.
+    pub fn edges(
+        &self,
+        group: &GroupEstimate,
+        deviation: Values,
+        is_unseen: bool,
+        extra_misfit_n: f64,
+    ) -> (Vec<f64>, Vec<f64>) {
+        let (prepared, r) = (self.prepared, self.recording);
         let mut rng = ChaCha8Rng::seed_from_u64(SEED);
         let draws: Vec<Vec<f64>> = (0..DRAWS)
-            .filter_map(|_| free_run_force(&self.known.draw(self.model, r, &mut rng), self.data, r))
+            .filter_map(|_| {
+                let model = prepared.uncertainty.draw(&prepared.model, r, &mut rng);
+                let off = group.draw(&std::array::from_fn(|_| StandardNormal.sample(&mut rng)));
+                let at: Values = std::array::from_fn(|k| deviation[k] + off[k]);
+                prepared.force_of(&model, self.training, r, &at, self.mean_residual)
+            })
             .collect();
-        let blocks = self.data.recordings[r].len();
-        let (mut low, mut high) = (Vec::with_capacity(blocks), Vec::with_capacity(blocks));
-        let mut values = Vec::with_capacity(DRAWS * NOISE_VALUES);
-        let noise = noise_values(self.known.block_n);
-        for k in 0..blocks {
-            values.clear();
-            for draw in &draws {
-                values.extend(noise.iter().map(|x| draw[k] + x));
-            }
-            values.sort_unstable_by(f64::total_cmp);
-            low.push(quantile_of_sorted(&values, 0.5 * (1.0 - BAND_LEVEL)));
-            high.push(quantile_of_sorted(&values, 0.5 * (1.0 + BAND_LEVEL)));
-        }
-        (low, high)
+        band_edges(&draws, |k| self.misfit_sd_n(k, is_unseen).hypot(extra_misfit_n))
+    }
+
+    /// Standard deviation (N) of noise and misfit in block `k`.
+    fn misfit_sd_n(&self, k: usize, is_unseen: bool) -> f64 {
+        let noise_n = self.prepared.uncertainty.block_n;
+        let Some((t, place)) = self.training.zip(self.places.get(k)) else { return noise_n };
+        let of = |curve: &Curve| value_at(curve, *place).unwrap_or(0.0);
+        let missing_n = if is_unseen { of(self.mean_residual) } else { 0.0 };
+        noise_n.hypot(of(&t.discrepancy_sd_n)).hypot(missing_n)
     }
 }
 
+/// Lower and upper edge (N) per block of drawn forces with noise of standard deviation `sd_n`.
+pub fn band_edges(draws: &[Vec<f64>], sd_n: impl Fn(usize) -> f64) -> (Vec<f64>, Vec<f64>) {
+    let blocks = draws.first().map_or(0, Vec::len);
+    let (mut low, mut high) = (Vec::with_capacity(blocks), Vec::with_capacity(blocks));
+    let mut values = Vec::with_capacity(draws.len() * NOISE_VALUES);
+    for k in 0..blocks {
+        values.clear();
+        let noise = noise_values(sd_n(k));
+        for draw in draws {
+            values.extend(noise.iter().map(|x| draw[k] + x));
+        }
+        values.sort_unstable_by(f64::total_cmp);
+        low.push(quantile_of_sorted(&values, 0.5 * (1.0 - BAND_LEVEL)));
+        high.push(quantile_of_sorted(&values, 0.5 * (1.0 + BAND_LEVEL)));
+    }
+    (low, high)
+}
+
 /// Free-run force (N) of a model for recording `r`.
-fn free_run_force(model: &Model, data: &FitData, r: usize) -> Option<Vec<f64>> {
+pub fn free_run_force(model: &Model, data: &FitData, r: usize) -> Option<Vec<f64>> {
     let trail = stylet_identify::likelihood::ReplayCache::new(model, data, r)?;
     let mut at = model.clone();
     at.rupture_times_s[r] = trail.free_rupture_times();

@@ -249,6 +249,7 @@ fn diagnosis(
             friction: scatter.ln_friction,
         },
         advice: advice(best, &estimates),
+        training: None,
     };
     // The floor is what recordings predict of each other, so scatter between them is in it.
     claims::apply(&mut diagnosis, &Context::default());

@@ -4,7 +4,9 @@ use crate::chart_model::{Chart, Level, LineStyle, MarkerSet, Series, Side};
 use crate::page_model::{Cell, Page, Section, Status, Table, Tile};
 use crate::pages::formatting::{or_dash, significant_or_dash};
 use crate::palette::Colour;
-use stylet_diagnose::prediction::{Prediction, PredictionCurves, PredictionResult, RecordingPrediction};
+use stylet_diagnose::prediction::{
+    Prediction, PredictionCurves, PredictionResult, RecordingPrediction, Refit,
+};
 use stylet_scenario::Scenario;
 use stylet_stats::number_format::significant;
 
@@ -44,14 +46,88 @@ pub fn summary_sentence(p: &Prediction) -> String {
         significant(ratio, 2),
         100.0 * p.band_coverage
     );
+    let is_in_own_band = p.coverage_by_group.map_or(p.band_coverage, |c| c.same) >= 0.8;
     let how = if ratio < 1.2 && p.band_coverage >= 0.8 {
         "The model predicts these recordings to within the noise"
+    } else if p.band_coverage >= 0.8 && !is_in_own_band {
+        "The model predicts these recordings within what another group may differ by"
     } else if p.band_coverage >= 0.8 {
         "The model predicts these recordings within the scatter it was fitted with"
     } else {
         "The model does not predict these recordings"
     };
     format!("{how}: {within}.")
+}
+
+/// Which group of recordings the band assumes.
+#[must_use]
+pub fn group_sentence(p: &Prediction) -> String {
+    let assumed = if p.varying.is_empty() {
+        "The band is that of a new recording of the group that made the model".to_owned()
+    } else {
+        let what: Vec<String> = p.varying.iter().map(|f| format!("another {}", f.name())).collect();
+        format!("The band assumes another group than that which made the model: {}", what.join(", "))
+    };
+    let both = p.coverage_by_group.map_or_else(String::new, |c| {
+        format!(
+            "; {:.0} % of the samples are in the band of the same group, {:.0} % in that of an unseen one",
+            100.0 * c.same,
+            100.0 * c.unseen
+        )
+    });
+    format!("{assumed}{both}.")
+}
+
+/// What the refit did.
+#[must_use]
+pub fn refit_sentence(p: &Prediction) -> Option<String> {
+    let refit = p.refit.as_ref()?;
+    let errors = format!(
+        "RMS error of the {} fitted recording(s) {} N without and {} N with it",
+        refit.recordings,
+        significant(refit.before_n, 3),
+        significant(refit.after_n, 3)
+    );
+    if !refit.moved {
+        return Some(format!("The refit gains nothing and is not used: {errors}."));
+    }
+    let parameters: Vec<String> = refit
+        .parameters
+        .iter()
+        .map(|f| match f.parameter {
+            Refit::Surface => format!("surface {:+.2} ± {:.2} mm", 1e3 * f.value, 2e3 * f.sd),
+            Refit::Force => factor_text("force", f.value, f.sd),
+            Refit::Friction => factor_text("friction", f.value, f.sd),
+            Refit::Puncture => factor_text("puncture", f.value, f.sd),
+        })
+        .collect();
+    Some(format!("Refitted group (95 %): {}; {errors}.", parameters.join(", ")))
+}
+
+fn factor_text(name: &str, ln_factor: f64, sd: f64) -> String {
+    let at = |sds: f64| significant((ln_factor + sds * sd).exp(), 3);
+    format!("{name} x {} ({} to {})", at(0.0), at(-stylet_stats::Z95), at(stylet_stats::Z95))
+}
+
+/// A sentence for each mean curve that predicts better than the model.
+#[must_use]
+pub fn worse_than_baseline(p: &Prediction) -> Vec<String> {
+    let worse = p.baselines.iter().filter(|b| b.prediction_is_worse);
+    let sentence = |name: &str, own: f64, other: f64| {
+        format!(
+            "The model is worse than {name}: {} N rms against {} N.",
+            significant(own, 3),
+            significant(other, 3)
+        )
+    };
+    worse.map(|b| sentence(baseline_name(&b.name), b.prediction_rmse_n, b.rmse_n)).collect()
+}
+
+fn baseline_name(name: &str) -> &'static str {
+    match name {
+        "mean_curve" => "the mean curve of the recordings that made it at this speed",
+        _ => "the mean curve of the recordings that made it at other speeds, by depth and hold",
+    }
 }
 
 fn overview(found: &PredictionResult) -> Section {
@@ -77,6 +153,14 @@ fn overview(found: &PredictionResult) -> Section {
             "RMS residual of the scenario before the diagnosis".to_owned(),
         ));
     }
+    for b in &p.baselines {
+        let tile = Tile::new(
+            if b.name == "mean_curve" { "Mean curve" } else { "Mean of other speeds" },
+            format!("{} N", significant(b.rmse_n, 3)),
+            format!("RMS residual of {}", baseline_name(&b.name)),
+        );
+        tiles.push(tile.status(Status::at_most(b.prediction_rmse_n, b.rmse_n, f64::INFINITY)));
+    }
     let rows = p
         .recordings
         .iter()
@@ -92,7 +176,9 @@ fn overview(found: &PredictionResult) -> Section {
                 Cell::number(format!("{:.0} %", 100.0 * r.band_coverage)),
                 Cell::number(significant(r.peak_error_n, 2)),
                 Cell::number(or_dash(r.surface_shift_m.map(|m| format!("{:+.2} mm", 1e3 * m)))),
+                Cell::number(significant_or_dash(r.force_factor, 1.0, 3)),
                 Cell::number(significant_or_dash(r.friction_factor, 1.0, 3)),
+                Cell::number(significant_or_dash(r.puncture_factor, 1.0, 3)),
             ]
         })
         .collect();
@@ -105,16 +191,26 @@ fn overview(found: &PredictionResult) -> Section {
             "in the 90 % band",
             "peak force, measured minus predicted, N",
             "fitted surface shift",
+            "fitted force factor",
             "fitted friction factor",
+            "fitted puncture factor",
         ],
         rows,
     ));
+    section = section.text(group_sentence(p));
+    if let Some(sentence) = refit_sentence(p) {
+        section = section.text(sentence);
+    }
+    let mut warnings = worse_than_baseline(p);
     if !p.held_out {
-        section = section.warnings(vec![
-            "Surface or friction were fitted to the same recording, so the residual is smaller than for a new recording. With two or \
-             more recordings each is predicted from the others."
+        warnings.push(
+            "The group was fitted to the same recording, so the residual is smaller than for a new recording. With two or more \
+             recordings each is predicted from the others."
                 .to_owned(),
-        ]);
+        );
+    }
+    if !warnings.is_empty() {
+        section = section.warnings(warnings);
     }
     section
 }
@@ -139,6 +235,12 @@ fn force(r: &RecordingPrediction, s: &PredictionCurves) -> Chart {
         .with_series(line("measured", Colour::Grey, &s.measured_n).width(3.0));
     if let Some(before) = &s.assumed_n {
         chart = chart.with_series(line("assumed scenario", Colour::Vermillion, before).width(1.0));
+    }
+    let other = if s.is_unseen_group { "band of the same group" } else { "band of an unseen group" };
+    if let Some((low, high)) = &s.other_band_n {
+        for edge in [low, high] {
+            chart = chart.with_series(line(other, Colour::Grey, edge).width(0.6));
+        }
     }
     chart
         .with_series(line("predicted", Colour::Blue, &s.predicted_n).width(1.4))

@@ -1,7 +1,13 @@
+use super::super::group_deviation::Factor;
+use super::super::group_update::GroupEstimate;
+use super::super::insertion_course::{BINS, Curve, InsertionCourse};
+use super::super::prepared::Prepared;
+use super::super::training_summary::TrainingSummary;
 use super::{Band, NOISE_VALUES, SEED, Uncertainty, free_run_force, noise_values};
 use crate::diagnosis_json::{Cause, Diagnosis, Estimate, LabelledParameter, ParameterLabel, RandomEffectSd};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
@@ -73,19 +79,19 @@ fn the_uncertainty_is_read_from_the_diagnosis() {
         k.block_n
     );
     let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} for {b}");
-    assert_eq!(k.components().len(), 6);
+    assert_eq!(k.components(None, &[]).len(), 6);
     let mut d = diagnosis();
     d.random_effect_sd = RandomEffectSd { surface_m: 1e-4, ..RandomEffectSd::default() };
     // Noise hardly above the scatter within a block: the lower limit applies.
     d.noise.sd_n = 1.0001 * within;
     let k = Uncertainty::new(Some(&d), std::slice::from_ref(&b));
     near(k.block_n, d.noise.sd_n / 2.0);
-    assert_eq!(k.components(), ["sensor noise", "parameter intervals", "scatter of the surface"]);
+    assert_eq!(k.components(None, &[]), ["sensor noise", "parameter intervals", "scatter of the surface"]);
     let k = Uncertainty::new(None, &[b.clone(), b.clone()]);
     let rough = crate::base_law_fit::roughness(&[b.clone(), b]);
     near(k.floor_n, (rough * rough + within * within).sqrt());
     near(k.block_n, rough);
-    assert_eq!(k.components(), ["sensor noise"]);
+    assert_eq!(k.components(None, &[Factor::Needle]), ["sensor noise", "another needle"]);
 }
 
 fn model() -> Model {
@@ -185,23 +191,60 @@ fn drawn_parameters_stay_possible() {
     assert!(least(&|m| m.tissue.layers[0].thickness_m) > 2.9e-5);
 }
 
+/// A law with a misfit of 0.2 N in the middle of the advance.
 #[test]
-fn band_edges_are_quantiles_of_draws_and_noise() {
+fn band_edges_are_quantiles_of_draws_noise_and_misfit() {
     let b = blocks();
     let k = Uncertainty::new(Some(&diagnosis()), std::slice::from_ref(&b));
-    let data = FitData::new(Arc::new(vec![b]), Noise::white(0.03), 0.0);
     let m = model();
-    let (low, high) = Band { known: &k, model: &m, data: &data }.edges(0);
+    let z: Vec<f64> = (0..1200).map(|k| 2.5e-5 * f64::from(k)).collect();
+    let t = (0..1200).map(|k| f64::from(k) / 200.0).collect();
+    let course = InsertionCourse::new(&Recording::new(t, z, vec![0.0; 1200]).expect("a recording"));
+    let training = TrainingSummary {
+        range: course.range,
+        runs: Vec::new(),
+        residual_rms_n: 0.2,
+        discrepancy_sd_n: (0..BINS).map(|k| Some(if (30..60).contains(&k) { 0.2 } else { 0.0 })).collect(),
+        correlation_s: 0.0,
+        recording_sd: [0.0; 4],
+    };
+    let places = course.places(&b, course.range, 0.0);
+    let prepared = Prepared {
+        names: vec![String::new()],
+        data: FitData::new(Arc::new(vec![b]), Noise::white(0.03), 0.0),
+        courses: vec![course],
+        model: m.clone(),
+        uncertainty: k.clone(),
+    };
+    let mean_residual: Curve = vec![Some(0.0); BINS];
+    let band = Band {
+        prepared: &prepared,
+        training: Some(&training),
+        recording: 0,
+        mean_residual: &mean_residual,
+        places: &places,
+    };
+    let same = GroupEstimate::new(&[], [0.0; 4], [0.0; 4]);
+    let (low, high) = band.edges(&same, [0.0; 4], false, 0.0);
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-    let draws: Vec<Vec<f64>> =
-        (0..80).filter_map(|_| free_run_force(&k.draw(&m, 0, &mut rng), &data, 0)).collect();
+    let draws: Vec<Vec<f64>> = (0..80)
+        .filter_map(|_| {
+            let drawn = k.draw(&m, 0, &mut rng);
+            let _: [f64; 4] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
+            free_run_force(&drawn, &prepared.data, 0)
+        })
+        .collect();
     assert_eq!(draws.len(), 80);
-    for at in [20, 110, 260] {
-        let mut all: Vec<f64> =
-            draws.iter().flat_map(|d| noise_values(k.block_n).map(|x| d[at] + x)).collect();
+    for (at, misfit_n) in [(20, 0.0), (130, 0.2), (260, 0.0)] {
+        let sd_n = k.block_n.hypot(misfit_n);
+        let mut all: Vec<f64> = draws.iter().flat_map(|d| noise_values(sd_n).map(|x| d[at] + x)).collect();
         assert_eq!(all.len(), 80 * NOISE_VALUES);
         all.sort_by(f64::total_cmp);
         assert!((low[at] - stylet_stats::quantile_of_sorted(&all, 0.05)).abs() < 1e-12);
         assert!((high[at] - stylet_stats::quantile_of_sorted(&all, 0.95)).abs() < 1e-12);
     }
+    let (wide_low, wide_high) =
+        band.edges(&GroupEstimate::new(&[], [1e-3, 0.3, 0.3, 0.3], [0.0; 4]), [0.0; 4], true, 0.0);
+    let width = |low: &[f64], high: &[f64]| low.iter().zip(high).map(|(l, h)| h - l).sum::<f64>();
+    assert!(width(&wide_low, &wide_high) > 1.5 * width(&low, &high));
 }

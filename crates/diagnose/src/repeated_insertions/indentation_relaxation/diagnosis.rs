@@ -63,6 +63,7 @@ impl SpecimenReport {
             base_parameters: Vec::new(),
             parameters: Vec::new(),
             covariance: Vec::new(),
+            training: None,
             not_identifiable: unidentifiable_effects(),
             gain: Gain {
                 held_out: true,

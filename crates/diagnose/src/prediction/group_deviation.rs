@@ -1,0 +1,104 @@
+//! How a group of recordings may differ from that of the law: parameters and their spreads
+//! (`docs/reference/spreads.md`).
+
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use stylet_identify::model::{Assumptions, Model};
+use stylet_tissue::Effect;
+
+/// Number of parameters.
+pub const PARAMETERS: usize = 4;
+/// One value for each of `surface`, `force`, `friction` and `puncture`.
+pub type Values = [f64; PARAMETERS];
+
+/// A parameter in which a group may differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Refit {
+    /// Position of the surface.
+    Surface,
+    /// One factor for all forces of the tissue.
+    Force,
+    /// Friction: one factor for all layers, beyond that of all forces.
+    Friction,
+    /// Puncture force: one factor for all layers, beyond that of all forces.
+    Puncture,
+}
+
+impl Refit {
+    /// All, in the order of [`Values`].
+    pub const ALL: [Self; PARAMETERS] = [Self::Surface, Self::Force, Self::Friction, Self::Puncture];
+}
+
+/// What changes from one group of recordings to another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Factor {
+    /// Another needle.
+    Needle,
+    /// Another specimen or batch of the tissue.
+    Tissue,
+    /// Another day or set-up.
+    Setup,
+}
+
+impl Factor {
+    /// All.
+    pub const ALL: [Self; 3] = [Self::Needle, Self::Tissue, Self::Setup];
+
+    /// Standard deviations between groups: surface in m, the others of natural logarithms.
+    #[must_use]
+    pub const fn sd(self) -> Values {
+        match self {
+            Self::Needle => NEEDLE_SD,
+            Self::Tissue => TISSUE_SD,
+            Self::Setup => SETUP_SD,
+        }
+    }
+
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Needle => "needle",
+            Self::Tissue => "tissue",
+            Self::Setup => "set-up",
+        }
+    }
+}
+
+/// Spreads between needles: surface (m), logarithms of force, friction, puncture force.
+const NEEDLE_SD: Values = [0.5e-3, 0.2, 0.25, 0.25];
+/// Spreads between specimens or batches of tissue.
+const TISSUE_SD: Values = [1.5e-3, 0.25, 0.2, 0.25];
+/// Spreads between days or set-ups.
+const SETUP_SD: Values = [1e-3, 0.05, 0.1, 0.1];
+/// Spreads between recordings of one group, before any is known.
+pub const RECORDING_SD: Values = [0.2e-3, 0.03, 0.05, 0.1];
+/// Standard deviation of the exponent by which force depends on speed, for speeds that the law was not made with.
+pub const RATE_EXPONENT_SD: f64 = 0.1;
+
+/// Standard deviations of an unseen group in which `varying` differ.
+#[must_use]
+pub fn group_sd(varying: &[Factor]) -> Values {
+    std::array::from_fn(|k| varying.iter().map(|f| f.sd()[k].powi(2)).sum::<f64>().sqrt())
+}
+
+/// The model of recording `r` in a group that deviates; the factor of all forces is not in it.
+#[must_use]
+pub fn deviating_model(model: &Model, r: usize, deviation: &Values) -> Model {
+    let [surface_m, _, ln_friction, ln_puncture] = *deviation;
+    let mut out = model.clone();
+    out.per_recording[r].surface_m += surface_m;
+    out.per_recording[r].ln_friction += ln_friction;
+    if ln_puncture != 0.0 {
+        let factor = libm::exp(ln_puncture);
+        let mut effects = out.assumed.known_effects.clone();
+        for (k, layer) in out.tissue.layers.iter_mut().enumerate() {
+            layer.puncture_n = layer.puncture_n.map(|f| f * factor);
+            effects.iter_mut().for_each(|e| e.scale_puncture(k + 1, factor));
+        }
+        out.assumed = Arc::new(Assumptions { known_effects: effects, ..Assumptions::clone(&model.assumed) });
+    }
+    out
+}

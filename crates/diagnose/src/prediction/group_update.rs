@@ -1,0 +1,265 @@
+//! Gaussian update of a group's deviation from the law.
+//!
+//! Recording `r` of a group deviates from the law by `u_r`, normal about the group's `u` with the spreads between
+//! recordings; `u` is normal about zero with those between groups. The force is linearised about the best `u_r` of each
+//! recording, and the update of `u` is then linear (Gelman and others, *Bayesian Data Analysis*, chapters 5 and 15). The
+//! group may also be that of the law, or differ in some parameters only: the mean is averaged over all subsets of parameters
+//! by their marginal likelihoods (Hoeting and others 1999), so that little evidence moves little. Before any recording, no
+//! deviation at all is as probable as all other subsets together.
+
+use super::group_deviation::{PARAMETERS, Values};
+use stylet_stats::linear_algebra::{CholeskyFactor, SymmetricMatrix};
+
+/// Iterations of the fit to one recording.
+const MAX_ITERATIONS: usize = 10;
+/// Smallest gain in nats of an iteration.
+const MIN_GAIN_NATS: f64 = 1e-3;
+/// Steps of the numerical derivatives, in standard deviations of the prior: ruptures move by more than a sample.
+const DERIVATIVE_STEP: f64 = 0.25;
+/// Halvings of a step that does not lower the objective.
+const MAX_HALVINGS: usize = 6;
+/// Surface positions to start from, in standard deviations of the prior.
+const SURFACE_STARTS: [f64; 9] = [0.0, -1.0, 1.0, -2.0, 2.0, -3.0, 3.0, -4.0, 4.0];
+
+/// What one recording says about its deviation.
+#[derive(Clone, Debug)]
+pub struct RecordingEstimate {
+    /// Most probable deviation.
+    pub deviation: Values,
+    /// Information matrix of the recording alone.
+    information: SymmetricMatrix,
+    /// Standard deviations of the prior.
+    prior_sd: Values,
+}
+
+/// A recording to be fitted.
+pub struct Observation<'a> {
+    /// Measured force in N.
+    pub force_n: &'a [f64],
+    /// Whether a block is compared.
+    pub used: &'a [bool],
+    /// Weight of a squared error, in 1/N²: independent samples per block over the variance.
+    pub weight: f64,
+}
+
+impl Observation<'_> {
+    fn nats(&self, predicted_n: &[f64]) -> f64 {
+        let square = self.residuals(predicted_n).map(|(_, e)| e * e).sum::<f64>();
+        0.5 * self.weight * square
+    }
+
+    /// Index and residual of every compared block.
+    fn residuals<'b>(&'b self, predicted_n: &'b [f64]) -> impl Iterator<Item = (usize, f64)> + 'b {
+        let all = self.force_n.iter().zip(predicted_n).zip(self.used).enumerate();
+        all.filter(|(_, (_, used))| **used).map(|(k, ((y, f), _))| (k, y - f))
+    }
+}
+
+/// Fits the deviation of one recording; `force` predicts its blocks.
+pub fn estimate_recording(
+    observed: &Observation,
+    force: impl Fn(&Values) -> Option<Vec<f64>>,
+    prior_sd: Values,
+) -> Option<RecordingEstimate> {
+    let scaled = |v: &Values| -> Values { std::array::from_fn(|j| v[j] * prior_sd[j]) };
+    let at = |v: &Values| -> Option<(f64, Vec<f64>)> {
+        let f = force(&scaled(v))?;
+        Some((observed.nats(&f) + 0.5 * v.iter().map(|v| v * v).sum::<f64>(), f))
+    };
+    let mut v = [0.0; PARAMETERS];
+    let (mut nats, mut predicted) = at(&v)?;
+    for start in SURFACE_STARTS.iter().filter(|_| prior_sd[0] > 0.0) {
+        let trial = [*start, 0.0, 0.0, 0.0];
+        if let Some((trial_nats, f)) = at(&trial)
+            && trial_nats < nats
+        {
+            (v, nats, predicted) = (trial, trial_nats, f);
+        }
+    }
+    let mut information = SymmetricMatrix::zeros(PARAMETERS);
+    for _ in 0..MAX_ITERATIONS {
+        let slopes: Vec<Vec<f64>> = (0..PARAMETERS)
+            .map(|j| {
+                let moved = |by: f64| {
+                    let mut moved = v;
+                    moved[j] += by;
+                    force(&scaled(&moved))
+                };
+                let both = (prior_sd[j] > 0.0).then(|| moved(-DERIVATIVE_STEP).zip(moved(DERIVATIVE_STEP)));
+                both.flatten().map_or_else(
+                    || vec![0.0; predicted.len()],
+                    |(a, b)| a.iter().zip(&b).map(|(a, b)| (b - a) / (2.0 * DERIVATIVE_STEP)).collect(),
+                )
+            })
+            .collect();
+        information = SymmetricMatrix::zeros(PARAMETERS);
+        let mut gradient = v.map(|v| -v);
+        for (k, e) in observed.residuals(&predicted) {
+            for i in 0..PARAMETERS {
+                gradient[i] += observed.weight * slopes[i][k] * e;
+                (0..=i).for_each(|j| information.add(i, j, observed.weight * slopes[i][k] * slopes[j][k]));
+            }
+        }
+        let step = with_identity(&information).solve(&gradient);
+        let trials = (0..=MAX_HALVINGS).map(|k| libm::exp2(-(k as f64)));
+        let better = trials
+            .filter_map(|share| {
+                let trial: Values = std::array::from_fn(|j| v[j] + share * step[j]);
+                at(&trial).map(|(n, f)| (n, trial, f))
+            })
+            .find(|(n, ..)| *n < nats);
+        let Some((next, trial, f)) = better else { break };
+        let gain = nats - next;
+        (v, nats, predicted) = (trial, next, f);
+        if gain < MIN_GAIN_NATS {
+            break;
+        }
+    }
+    let mut unscaled = SymmetricMatrix::zeros(PARAMETERS);
+    for i in 0..PARAMETERS {
+        for j in (0..=i).filter(|j| prior_sd[i] > 0.0 && prior_sd[*j] > 0.0) {
+            unscaled.add(i, j, information.at(i, j) / (prior_sd[i] * prior_sd[j]));
+        }
+    }
+    Some(RecordingEstimate { deviation: scaled(&v), information: unscaled, prior_sd })
+}
+
+/// Cholesky factor of a matrix plus the identity.
+fn with_identity(matrix: &SymmetricMatrix) -> CholeskyFactor {
+    let mut sum = matrix.clone();
+    (0..sum.size).for_each(|k| sum.add(k, k, 1.0));
+    sum.cholesky()
+}
+
+/// `D A D` for a diagonal `D`.
+fn rescaled(matrix: &SymmetricMatrix, by: &Values) -> SymmetricMatrix {
+    let mut out = SymmetricMatrix::zeros(PARAMETERS);
+    for i in 0..PARAMETERS {
+        (0..=i).for_each(|j| out.add(i, j, by[i] * matrix.at(i, j) * by[j]));
+    }
+    out
+}
+
+fn product(matrix: &SymmetricMatrix, by: &Values) -> Values {
+    std::array::from_fn(|i| (0..PARAMETERS).map(|j| matrix.at(i, j) * by[j]).sum())
+}
+
+/// Distribution of a group's deviation.
+#[derive(Clone, Debug)]
+pub struct GroupEstimate {
+    /// Mean over the subsets of parameters.
+    pub mean: Values,
+    /// Mean when all parameters deviate.
+    pub full_mean: Values,
+    /// Probability that each parameter deviates.
+    pub probability: Values,
+    /// Standard deviations before the update.
+    prior_sd: Values,
+    /// Factor of the precision with all parameters, relative to the prior's.
+    precision: CholeskyFactor,
+}
+
+/// Posterior of the deviation when the parameters with a standard deviation of zero are those of the law.
+struct Subset {
+    mean: Values,
+    precision: CholeskyFactor,
+    /// Logarithm of the marginal likelihood over that without any deviation.
+    ln_evidence: f64,
+}
+
+impl Subset {
+    fn new(information: &SymmetricMatrix, weighted: &Values, sd: &Values) -> Self {
+        let precision = with_identity(&rescaled(information, sd));
+        let scaled: Values = std::array::from_fn(|k| sd[k] * weighted[k]);
+        let solved = precision.solve(&scaled);
+        let gain: f64 = scaled.iter().zip(&solved).map(|(a, b)| a * b).sum();
+        Self {
+            mean: std::array::from_fn(|k| sd[k] * solved[k]),
+            ln_evidence: 0.5 * (gain - precision.log_determinant()),
+            precision,
+        }
+    }
+}
+
+impl GroupEstimate {
+    /// The group before any recording of it, or after some.
+    #[must_use]
+    pub fn new(recordings: &[&RecordingEstimate], group_sd: Values, recording_sd: Values) -> Self {
+        let mut information = SymmetricMatrix::zeros(PARAMETERS);
+        let mut weighted = [0.0; PARAMETERS];
+        for r in recordings {
+            // (A^-1 + R^2)^-1 = A - A R (1 + R A R)^-1 R A, without an inverse of A.
+            let inner = with_identity(&rescaled(&r.information, &recording_sd));
+            let reduced = |x: &Values| -> Values {
+                let scaled: Vec<f64> = x.iter().zip(&recording_sd).map(|(x, sd)| x * sd).collect();
+                let solved = inner.solve(&scaled);
+                let back: Values = std::array::from_fn(|k| recording_sd[k] * solved[k]);
+                let less = product(&r.information, &back);
+                std::array::from_fn(|k| x[k] - less[k])
+            };
+            for j in 0..PARAMETERS {
+                let column = reduced(&std::array::from_fn(|i| r.information.at(i, j)));
+                (j..PARAMETERS).for_each(|i| information.add(i, j, column[i]));
+            }
+            let pull = product(&r.information, &r.deviation);
+            let normal: Values = std::array::from_fn(|k| {
+                let sd = r.prior_sd[k];
+                pull[k] + if sd > 0.0 { r.deviation[k] / (sd * sd) } else { 0.0 }
+            });
+            let of_group = reduced(&normal);
+            (0..PARAMETERS).for_each(|k| weighted[k] += of_group[k]);
+        }
+        let free: Vec<usize> = (0..PARAMETERS).filter(|k| group_sd[*k] > 0.0).collect();
+        let subsets: Vec<(Values, Subset)> = (0..1_usize << free.len())
+            .map(|mask| {
+                let is_in =
+                    |k: usize| free.iter().position(|f| *f == k).is_some_and(|bit| mask >> bit & 1 == 1);
+                let sd = std::array::from_fn(|k| if is_in(k) { group_sd[k] } else { 0.0 });
+                (sd, Subset::new(&information, &weighted, &sd))
+            })
+            .collect();
+        let best = subsets.iter().map(|(_, s)| s.ln_evidence).fold(f64::NEG_INFINITY, f64::max);
+        let others = (subsets.len() - 1).max(1) as f64;
+        let (mut mean, mut probability, mut total) = ([0.0; PARAMETERS], [0.0; PARAMETERS], 0.0);
+        for (mask, (sd, subset)) in subsets.iter().enumerate() {
+            let prior = if mask == 0 { others } else { 1.0 };
+            let weight = prior * libm::exp(subset.ln_evidence - best);
+            total += weight;
+            for k in 0..PARAMETERS {
+                mean[k] += weight * subset.mean[k];
+                probability[k] += if sd[k] > 0.0 { weight } else { 0.0 };
+            }
+        }
+        let full = Subset::new(&information, &weighted, &group_sd);
+        Self {
+            mean: mean.map(|m| m / total),
+            full_mean: full.mean,
+            probability: probability.map(|p| p / total),
+            prior_sd: group_sd,
+            precision: full.precision,
+        }
+    }
+
+    /// Whether a parameter may deviate.
+    #[must_use]
+    pub fn is_free(&self, parameter: usize) -> bool {
+        self.prior_sd[parameter] > 0.0
+    }
+
+    /// Standard deviations when all parameters may deviate.
+    #[must_use]
+    pub fn sd(&self) -> Values {
+        let variance = self.precision.inverse_diagonal();
+        std::array::from_fn(|k| self.prior_sd[k] * variance[k].max(0.0).sqrt())
+    }
+
+    /// A drawn difference from the mean, from independent standard normal values.
+    #[must_use]
+    pub fn draw(&self, independent: &Values) -> Values {
+        let off = self.precision.back_substitute(independent);
+        std::array::from_fn(|k| self.prior_sd[k] * off[k])
+    }
+}
+
+#[cfg(test)]
+mod tests;

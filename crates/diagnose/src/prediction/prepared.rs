@@ -1,0 +1,119 @@
+//! Recordings and a model, ready for predictions.
+
+use super::group_deviation::{Values, deviating_model};
+use super::insertion_course::{Curve, InsertionCourse, value_at};
+use super::prediction_band::{Uncertainty, free_run_force};
+use super::training_summary::TrainingSummary;
+use crate::base_law_fit::assumptions_of;
+use crate::diagnosis_json::Diagnosis;
+use crate::input_checks::{NamedRecording, clean_recordings};
+use stylet_stats::parallel::*;
+use std::sync::Arc;
+use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::likelihood::FitData;
+use stylet_identify::model::Model;
+use stylet_identify::noise::Noise;
+use stylet_scenario::Scenario;
+
+/// Recordings and a model.
+pub struct Prepared {
+    /// Names of the recordings.
+    pub names: Vec<String>,
+    /// The recordings in blocks.
+    pub data: FitData,
+    /// Their motions.
+    pub courses: Vec<InsertionCourse>,
+    /// The model.
+    pub model: Model,
+    /// Noise, scatter and intervals of the diagnosis.
+    pub uncertainty: Uncertainty,
+}
+
+impl Prepared {
+    /// Prepares recordings.
+    pub fn new(scenario: &Scenario, diagnosis: Option<&Diagnosis>, evidence: &[NamedRecording]) -> Self {
+        let ready = clean_recordings(evidence);
+        let blocks: Vec<BlockAverages> = ready
+            .recordings
+            .par_iter()
+            .zip(&ready.raw.exclude)
+            .map(|(r, x)| BlockAverages::new(r, x, BLOCK_S))
+            .collect();
+        let uncertainty = Uncertainty::new(diagnosis, &blocks);
+        let n = blocks.len();
+        Self {
+            names: evidence.iter().map(|e| e.name.clone()).collect(),
+            courses: ready.recordings.iter().map(InsertionCourse::new).collect(),
+            data: FitData::new(Arc::new(blocks), Noise::white(uncertainty.block_n), 0.0),
+            model: Model::base(Arc::new(assumptions_of(scenario)), n),
+            uncertainty,
+        }
+    }
+
+    /// Free-run force (N) of the law per block.
+    pub fn free_run(&self, r: usize) -> Option<Vec<f64>> {
+        free_run_force(&self.model, &self.data, r)
+    }
+
+    /// Length of a block in s.
+    pub fn block_s(&self, b: &BlockAverages) -> f64 {
+        (b.samples_per_block as f64 * b.sample_step_s).max(1e-9)
+    }
+
+    /// Weight of a squared error of recording `r` in 1/N²: the misfit is correlated, so that a block counts for less than
+    /// one independent sample.
+    pub fn weight(&self, training: Option<&TrainingSummary>, r: usize) -> f64 {
+        let block_s = self.block_s(&self.data.recordings[r]);
+        let correlation_s = training.map_or(0.0, |t| t.correlation_s);
+        block_s / (block_s + 2.0 * correlation_s) / self.misfit_n(training).powi(2)
+    }
+
+    /// RMS error (N) of the law in its own group; the noise, where the recordings that made it are not known.
+    pub fn misfit_n(&self, training: Option<&TrainingSummary>) -> f64 {
+        training.map_or(self.uncertainty.block_n, |t| t.residual_rms_n).max(1e-12)
+    }
+
+    /// Force (N) per block of recording `r` in a group that deviates, with the mean residual of the law.
+    pub fn force(
+        &self,
+        training: Option<&TrainingSummary>,
+        r: usize,
+        deviation: &Values,
+        mean_residual: &Curve,
+    ) -> Option<Vec<f64>> {
+        self.force_of(&self.model, training, r, deviation, mean_residual)
+    }
+
+    /// The same for another model.
+    pub fn force_of(
+        &self,
+        model: &Model,
+        training: Option<&TrainingSummary>,
+        r: usize,
+        deviation: &Values,
+        mean_residual: &Curve,
+    ) -> Option<Vec<f64>> {
+        let mut force = free_run_force(&deviating_model(model, r, deviation), &self.data, r)?;
+        self.add_mean_residual(training, r, deviation, mean_residual, &mut force);
+        Some(force)
+    }
+
+    /// Adds the mean residual, moved with the surface, and the factor of all forces.
+    pub fn add_mean_residual(
+        &self,
+        training: Option<&TrainingSummary>,
+        r: usize,
+        deviation: &Values,
+        mean_residual: &Curve,
+        force_n: &mut [f64],
+    ) {
+        let factor = libm::exp(deviation[1]);
+        if let Some(t) = training {
+            let places = self.courses[r].places(&self.data.recordings[r], t.range, deviation[0]);
+            for (f, place) in force_n.iter_mut().zip(&places) {
+                *f += value_at(mean_residual, *place).unwrap_or(0.0);
+            }
+        }
+        force_n.iter_mut().for_each(|f| *f *= factor);
+    }
+}

@@ -1,0 +1,267 @@
+//! What the recordings that made a law show about it: their curves, the law's misfit, the spread between them.
+
+use super::group_deviation::{PARAMETERS, RECORDING_SD, Values};
+use super::group_update::{Observation, estimate_recording};
+use super::insertion_course::{BINS, Curve, DepthRange, curve_of, mean_curve, pooled, value_at};
+use super::prediction_band::{BAND_LEVEL, band_edges};
+use super::prepared::Prepared;
+use stylet_stats::parallel::*;
+use serde::{Deserialize, Serialize};
+
+/// Recordings have one speed when it differs by at most this share.
+const SPEED_TOLERANCE: f64 = 0.1;
+/// Recordings have one stroke when it differs by at most this length (m).
+const STROKE_TOLERANCE_M: f64 = 1e-3;
+/// Lag (s) at which the correlation of the misfit is measured: several blocks, and short compared with an insertion.
+const CORRELATION_LAG_S: f64 = 0.2;
+/// Bounds of the correlation at that lag: times below 0.04 s and above 20 s are not distinguished.
+const CORRELATION_BOUNDS: (f64, f64) = (0.01, 0.99);
+/// Recordings that the documented spread between recordings counts for.
+const PRIOR_RECORDINGS: f64 = 2.0;
+/// Factors of the misfit's standard deviation, of which the first is used whose band holds nine tenths of the samples.
+const MISFIT_SCALES: [f64; 9] = [0.6, 0.7, 0.8, 0.9, 1.0, 1.2, 1.4, 1.7, 2.0];
+/// Decimal places (N) of the stored curves: 1 µN.
+const STORED_DECIMALS: f64 = 1e6;
+/// Two recordings are the same when their curves differ by at most this share of the largest force.
+const SAME_RECORDING_SHARE: f64 = 1e-5;
+
+/// A recording that took part in making the law.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrainingRun {
+    /// Name.
+    pub name: String,
+    /// Median speed of the advance in m/s.
+    pub speed_mps: f64,
+    /// Deepest position in m.
+    pub stroke_m: f64,
+    /// Measured force (N) over the course of the insertion.
+    pub force_n: Curve,
+    /// Measured minus predicted force (N).
+    pub residual_n: Curve,
+}
+
+impl TrainingRun {
+    fn is_like(&self, speed_mps: f64, stroke_m: f64) -> bool {
+        (self.speed_mps - speed_mps).abs() <= SPEED_TOLERANCE * speed_mps
+            && (self.stroke_m - stroke_m).abs() <= STROKE_TOLERANCE_M
+    }
+}
+
+/// What the recordings that made a law show about it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TrainingSummary {
+    /// Depths of the curves.
+    pub range: DepthRange,
+    /// The recordings.
+    pub runs: Vec<TrainingRun>,
+    /// RMS error (N) of the law with the mean residual of the other recordings.
+    pub residual_rms_n: f64,
+    /// Standard deviation (N) of the misfit that neither noise nor the scatter of parameters explains.
+    pub discrepancy_sd_n: Curve,
+    /// Correlation time of the misfit in s.
+    pub correlation_s: f64,
+    /// Standard deviations between recordings: surface (m), logarithms of force, friction, puncture force.
+    pub recording_sd: Values,
+}
+
+/// Baselines without a model for one recording.
+#[derive(Clone, Debug, Default)]
+pub struct BaselineCurves {
+    /// Mean of the recordings at this speed.
+    pub mean: Option<Curve>,
+    /// Mean of those at other speeds.
+    pub stretched: Option<Curve>,
+}
+
+impl TrainingSummary {
+    /// The training recording that has this curve.
+    pub fn index_of(&self, force_n: &Curve) -> Option<usize> {
+        let largest_n = force_n.iter().flatten().fold(0.0_f64, |m, f| m.max(f.abs()));
+        self.runs.iter().position(|run| {
+            run.force_n.iter().zip(force_n).all(|pair| match pair {
+                (Some(a), Some(b)) => (a - b).abs() <= SAME_RECORDING_SHARE * largest_n,
+                (None, None) => true,
+                _ => false,
+            })
+        })
+    }
+
+    /// Logarithm of a speed over the nearest one of the training recordings.
+    pub fn ln_speed_ratio(&self, speed_mps: f64) -> f64 {
+        let ratios = self.runs.iter().map(|run| libm::log(speed_mps / run.speed_mps).abs());
+        ratios.filter(|r| r.is_finite()).reduce(f64::min).unwrap_or(0.0)
+    }
+
+    /// Mean residual of the recordings without the one at index `except`: of those at this speed and stroke, or else of all.
+    /// It is shrunk by the share of its square that its own scatter explains (James and Stein 1961), and zero for fewer
+    /// than two recordings.
+    pub fn mean_residual(&self, speed_mps: f64, stroke_m: f64, except: Option<usize>) -> Curve {
+        let others = || self.runs.iter().enumerate().filter(move |(k, _)| Some(*k) != except);
+        let like: Vec<&Curve> = others()
+            .filter(|(_, run)| run.is_like(speed_mps, stroke_m))
+            .map(|(_, run)| &run.residual_n)
+            .collect();
+        let chosen = if like.len() > 1 { like } else { others().map(|(_, run)| &run.residual_n).collect() };
+        let n = chosen.len() as f64;
+        let mean = mean_curve(&chosen);
+        if chosen.len() < 2 {
+            return mean.iter().map(|m| m.map(|_| 0.0)).collect();
+        }
+        let variance = |(k, m): (usize, &Option<f64>)| {
+            let m = (*m)?;
+            let square: f64 = chosen.iter().filter_map(|c| c[k]).map(|e| (e - m).powi(2)).sum();
+            Some(square / (n - 1.0) / n)
+        };
+        let by_chance = pooled(&mean.iter().enumerate().map(variance).collect::<Curve>());
+        let square = pooled(&mean.iter().map(|m| m.map(|m| m * m)).collect::<Curve>());
+        let shrunk = |k: usize| {
+            let (square, by_chance) = (square[k]?, by_chance[k]?);
+            let share = if square > by_chance { 1.0 - by_chance / square } else { 0.0 };
+            Some(share * mean[k]?)
+        };
+        (0..BINS).map(shrunk).collect()
+    }
+
+    /// Mean curves of the recordings without the one at index `except`.
+    pub fn baselines(&self, speed_mps: f64, stroke_m: f64, except: Option<usize>) -> BaselineCurves {
+        let (mut like, mut other) = (Vec::new(), Vec::new());
+        for (_, run) in self.runs.iter().enumerate().filter(|(k, _)| Some(*k) != except) {
+            if run.is_like(speed_mps, stroke_m) { &mut like } else { &mut other }.push(&run.force_n);
+        }
+        let mean = |runs: &[&Curve]| (!runs.is_empty()).then(|| mean_curve(runs));
+        BaselineCurves { mean: mean(&like), stretched: mean(&other) }
+    }
+}
+
+fn stored(curve: Curve) -> Curve {
+    curve.into_iter().map(|x| x.map(|x| (x * STORED_DECIMALS).round() / STORED_DECIMALS)).collect()
+}
+
+/// Sum over the compared blocks of the product with the block `lag` later.
+fn lagged_sum(e: &[f64], used: &[bool], lag: usize) -> f64 {
+    (lag..e.len()).filter(|k| used[*k] && used[k - lag]).map(|k| e[k] * e[k - lag]).sum()
+}
+
+/// Summary of the recordings that made a law; `None` when the law cannot be evaluated on them.
+pub(super) fn summarise(prepared: &Prepared) -> Option<TrainingSummary> {
+    let Prepared { data, courses, names, uncertainty, .. } = prepared;
+    let n = names.len();
+    let range = courses.iter().map(|c| c.range).reduce(|a, b| DepthRange {
+        start_m: a.start_m.min(b.start_m),
+        deepest_m: a.deepest_m.max(b.deepest_m),
+    })?;
+    let forces: Vec<Vec<f64>> =
+        (0..n).into_par_iter().map(|r| prepared.free_run(r)).collect::<Option<_>>()?;
+    let places: Vec<Vec<f64>> =
+        courses.iter().zip(data.recordings.iter()).map(|(c, b)| c.places(b, range, 0.0)).collect();
+    let residuals: Vec<Vec<f64>> = (0..n)
+        .map(|r| data.recordings[r].force_n.iter().zip(&forces[r]).map(|(y, f)| y - f).collect())
+        .collect();
+    let curve = |r: usize, values: &[f64]| curve_of(&places[r], &data.recordings[r].used, values);
+    let runs = (0..n)
+        .map(|r| TrainingRun {
+            name: names[r].clone(),
+            speed_mps: courses[r].speed_mps,
+            stroke_m: courses[r].range.deepest_m,
+            force_n: stored(curve(r, &data.recordings[r].force_n)),
+            residual_n: stored(curve(r, &residuals[r])),
+        })
+        .collect();
+    let mut out = TrainingSummary {
+        range,
+        runs,
+        residual_rms_n: 0.0,
+        discrepancy_sd_n: Vec::new(),
+        correlation_s: 0.0,
+        recording_sd: RECORDING_SD,
+    };
+    let mean_residuals: Vec<Curve> = out
+        .runs
+        .iter()
+        .enumerate()
+        .map(|(r, run)| out.mean_residual(run.speed_mps, run.stroke_m, Some(r)))
+        .collect();
+    // What remains of each recording with the mean residual of the others.
+    let left: Vec<Vec<f64>> = (0..n)
+        .map(|r| {
+            let mean = |place: &f64| value_at(&mean_residuals[r], *place).unwrap_or(0.0);
+            residuals[r].iter().zip(&places[r]).map(|(e, place)| e - mean(place)).collect()
+        })
+        .collect();
+    let mean_square = |of: &dyn Fn(usize) -> Vec<f64>| {
+        let curves: Vec<Curve> = (0..n).map(|r| curve(r, &of(r))).collect();
+        pooled(&mean_of_known(&curves))
+    };
+    let total = mean_square(&|r| left[r].iter().map(|e| e * e).collect());
+    let draws: Vec<Vec<Vec<f64>>> = (0..n).into_par_iter().map(|r| uncertainty.draws(prepared, r)).collect();
+    let variance = |r: usize| {
+        let column = |k: usize| draws[r].iter().map(|d| d[k]).collect::<Vec<f64>>();
+        (0..residuals[r].len()).map(|k| stylet_stats::variance(&column(k))).collect::<Vec<f64>>()
+    };
+    let explained = mean_square(&variance);
+    let beyond = |(t, x): (&Option<f64>, &Option<f64>)| {
+        Some((t.as_ref()? - x.as_ref()? - uncertainty.block_n.powi(2)).max(0.0).sqrt())
+    };
+    let discrepancy: Curve = total.iter().zip(&explained).map(beyond).collect();
+    // Misfits are not normal: of few recordings one may differ from all others.
+    let coverage = |scale: f64| {
+        let each = (0..n).into_par_iter().map(|r| {
+            let b = &data.recordings[r];
+            let sd_n = |k: usize| {
+                uncertainty.block_n.hypot(scale * value_at(&discrepancy, places[r][k]).unwrap_or(0.0))
+            };
+            let (low, high) = band_edges(&draws[r], sd_n);
+            // The band lies about the law; the mean residual moves both.
+            let inside = |k: &usize| (low[*k]..=high[*k]).contains(&(forces[r][*k] + left[r][*k]));
+            let used: Vec<usize> = (0..b.len()).filter(|k| b.used[*k] && *k < low.len()).collect();
+            (used.iter().filter(|k| inside(k)).count() as f64, used.len() as f64)
+        });
+        let (inside, blocks) = each.reduce(|| (0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        inside / blocks.max(1.0)
+    };
+    let scale = MISFIT_SCALES.into_iter().find(|scale| coverage(*scale) >= BAND_LEVEL);
+    let scale = scale.unwrap_or(MISFIT_SCALES[MISFIT_SCALES.len() - 1]);
+    out.discrepancy_sd_n = stored(discrepancy.iter().map(|d| d.map(|d| scale * d)).collect());
+    let (mut square, mut lagged, mut blocks) = (0.0, 0.0, 0.0);
+    for (e, b) in left.iter().zip(data.recordings.iter()) {
+        let lag = (CORRELATION_LAG_S / prepared.block_s(b)).round().max(1.0) as usize;
+        square += lagged_sum(e, &b.used, 0);
+        lagged += lagged_sum(e, &b.used, lag);
+        blocks += b.used.iter().filter(|u| **u).count() as f64;
+    }
+    out.residual_rms_n = (square / f64::max(blocks, 1.0)).sqrt().max(uncertainty.block_n);
+    let correlation = (lagged / square.max(1e-300)).clamp(CORRELATION_BOUNDS.0, CORRELATION_BOUNDS.1);
+    out.correlation_s = -CORRELATION_LAG_S / libm::log(correlation);
+    out.recording_sd = recording_sd(prepared, &out, &mean_residuals)?;
+    Some(out)
+}
+
+/// Mean of the curves that have a value.
+fn mean_of_known(curves: &[Curve]) -> Curve {
+    (0..BINS)
+        .map(|k| {
+            let known: Vec<f64> = curves.iter().filter_map(|c| c[k]).collect();
+            (!known.is_empty()).then(|| stylet_stats::mean(&known))
+        })
+        .collect()
+}
+
+/// Spreads of the training recordings about the law, with the documented ones as prior.
+fn recording_sd(prepared: &Prepared, so_far: &TrainingSummary, mean_residuals: &[Curve]) -> Option<Values> {
+    let wide = super::group_deviation::group_sd(&super::group_deviation::Factor::ALL);
+    let each: Vec<Values> = (0..prepared.names.len())
+        .into_par_iter()
+        .map(|r| {
+            let b = &prepared.data.recordings[r];
+            let observed =
+                Observation { force_n: &b.force_n, used: &b.used, weight: prepared.weight(Some(so_far), r) };
+            let force = |u: &Values| prepared.force(Some(so_far), r, u, &mean_residuals[r]);
+            Some(estimate_recording(&observed, force, wide)?.deviation)
+        })
+        .collect::<Option<_>>()?;
+    let square = |k: usize| each.iter().map(|u| u[k] * u[k]).sum::<f64>();
+    let count = PRIOR_RECORDINGS + each.len() as f64;
+    let sd: [f64; PARAMETERS] =
+        std::array::from_fn(|k| ((PRIOR_RECORDINGS * RECORDING_SD[k].powi(2) + square(k)) / count).sqrt());
+    Some(sd)
+}
