@@ -7,13 +7,13 @@ use super::training_summary::TrainingSummary;
 use crate::base_law_fit::assumptions_of;
 use crate::diagnosis_json::Diagnosis;
 use crate::input_checks::{NamedRecording, clean_recordings};
-use stylet_stats::parallel::*;
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::Model;
 use stylet_identify::noise::Noise;
 use stylet_scenario::Scenario;
+use stylet_stats::parallel::*;
 
 /// Recordings and a model.
 pub struct Prepared {

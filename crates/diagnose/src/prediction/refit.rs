@@ -5,8 +5,8 @@ use super::group_update::{GroupEstimate, Observation, RecordingEstimate, estimat
 use super::predicted_recording::{Target, with_unseen_speed};
 use super::prepared::Prepared;
 use super::training_summary::TrainingSummary;
-use stylet_stats::parallel::*;
 use serde::{Deserialize, Serialize};
+use stylet_stats::parallel::*;
 
 /// A refitted parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -5,8 +5,8 @@ use super::group_update::{Observation, estimate_recording};
 use super::insertion_course::{BINS, Curve, DepthRange, curve_of, mean_curve, pooled, value_at};
 use super::prediction_band::{BAND_LEVEL, band_edges};
 use super::prepared::Prepared;
-use stylet_stats::parallel::*;
 use serde::{Deserialize, Serialize};
+use stylet_stats::parallel::*;
 
 /// Recordings have one speed when it differs by at most this share.
 const SPEED_TOLERANCE: f64 = 0.1;
@@ -216,7 +216,7 @@ pub(super) fn summarise(prepared: &Prepared) -> Option<TrainingSummary> {
             let used: Vec<usize> = (0..b.len()).filter(|k| b.used[*k] && *k < low.len()).collect();
             (used.iter().filter(|k| inside(k)).count() as f64, used.len() as f64)
         });
-        let (inside, blocks) = each.reduce(|| (0.0, 0.0), |a, b| (a.0 + b.0, a.1 + b.1));
+        let (inside, blocks) = each.into_iter().fold((0.0, 0.0), |a: (f64, f64), b| (a.0 + b.0, a.1 + b.1));
         inside / blocks.max(1.0)
     };
     let scale = MISFIT_SCALES.into_iter().find(|scale| coverage(*scale) >= BAND_LEVEL);
