@@ -1,7 +1,7 @@
 //! `stylet diagnose`: measured recordings compared with an assumed scenario.
 
 use crate::cli::args::DiagnoseArgs;
-use crate::cli::diagnosis_summary::summary;
+use crate::cli::diagnosis_summary::{fitted_law, summary};
 use crate::cli::exit_codes::Failure;
 use crate::cli::terminal_output::stage_printer;
 use stylet_api::output_folder::{check_folder, recover_parent};
@@ -53,5 +53,7 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let found = stylet_api::diagnose(&scenario, &recordings, &options, progress)?;
     drop(limit);
     let output = found.output(&scenario, &inputs)?.with_inputs(read);
-    args.results.write_and_print(&folder, &output, || summary(&found.diagnosis))
+    args.results.write_and_print(&folder, &output, || {
+        format!("{}\nFitted law: {}", summary(&found.diagnosis), fitted_law(&found.diagnosis))
+    })
 }

@@ -1,15 +1,13 @@
 //! `stylet identify`, and `stylet diagnose` without a scenario: the layers of a phantom from recordings alone.
 
 use crate::cli::args::{DiagnoseArgs, IdentifyArgs};
-use crate::cli::diagnosis_summary::summary;
+use crate::cli::diagnosis_summary::{fitted_law, summary};
 use crate::cli::exit_codes::Failure;
 use crate::cli::terminal_output::stage_printer;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use stylet_api::output_folder::{check_folder, write_file_atomically};
 use stylet_api::{DiagnosisInputs, resource_estimate};
 use stylet_diagnose::Diagnosis;
-use stylet_report::significant;
 
 /// File with the layers that the diagnosis started from.
 const FOUND_FILE: &str = "assumed.ron";
@@ -26,7 +24,7 @@ pub fn identify(args: &IdentifyArgs) -> Result<(), Failure> {
     if let Some(phantom) = &phantom {
         check_phantom(phantom)?;
     }
-    run(&args, phantom.as_deref(), |d| format!("{}\n{}", layers(d), summary(d)))
+    run(&args, phantom.as_deref(), |d| format!("{}\n{}", fitted_law(d), summary(d)))
 }
 
 /// `stylet diagnose` without a scenario.
@@ -45,7 +43,7 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     run(&args, None, |d| {
         format!(
             "No scenario was given: the layers are those that the recordings show.\n{}\n{}",
-            layers(d),
+            fitted_law(d),
             summary(d)
         )
     })
@@ -118,39 +116,4 @@ fn check_phantom(path: &Path) -> Result<(), Failure> {
         "{}: exists and was not written by stylet identify; name another file",
         path.display()
     )))
-}
-
-/// The layers in words, with intervals.
-fn layers(d: &Diagnosis) -> String {
-    let value = |layer: usize, name: &str, scale: f64, unit: &str| -> Option<String> {
-        let b = d.base_parameters.iter().find(|b| b.layer == layer && b.name == name)?;
-        let number = |x: f64| significant(scale * x, 4);
-        if b.at_least {
-            return Some(format!("at least {} {unit}", number(b.low)));
-        }
-        let label = d.parameters.iter().find(|p| p.effect.is_none() && p.layer == layer && p.name == name);
-        let open = label.map(|p| p.label_in_words()).filter(|words| words != "determined");
-        let remark = open.map_or(String::new(), |words| format!(", {words}"));
-        Some(format!("{} {unit} ({} to {}{remark})", number(b.value), number(b.low), number(b.high)))
-    };
-    let count = d.base_parameters.iter().map(|b| b.layer).max().unwrap_or(0);
-    let mut out = String::new();
-    let surface = value(0, "surface_m", 1e3, "mm").map_or(String::new(), |at| format!(", surface at {at}"));
-    let _ = writeln!(out, "{count} layer{}{surface}", if count == 1 { "" } else { "s" });
-    for layer in 1..=count {
-        let parts = [
-            ("thickness", value(layer, "thickness_m", 1e3, "mm")),
-            ("K", value(layer, "stiffness_n_per_m", 1.0, "N/m")),
-            ("b", value(layer, "friction_ns_per_m2", 1.0, "N s/m²")),
-            ("ruptures at", value(layer, "puncture_n", 1.0, "N")),
-        ];
-        let part = |(name, text): (&str, Option<String>)| {
-            let text = text?;
-            let name = if text.starts_with("at least") { "puncture force" } else { name };
-            Some(format!("{name} {text}"))
-        };
-        let parts: Vec<String> = parts.into_iter().filter_map(part).collect();
-        let _ = writeln!(out, "  layer {layer}: {}", parts.join(", "));
-    }
-    out
 }
