@@ -43,7 +43,7 @@ fn constants(text: &str) -> Vec<(String, String)> {
             whole = format!("{whole} {}", more.trim());
         }
         let Some((kind, value)) = whole.split_once(" =") else { continue };
-        if !["&str", "Kind", "Self"].iter().any(|no_number| kind.contains(no_number)) {
+        if !["&str", "Kind", "[Self"].iter().any(|no_number| kind.contains(no_number)) {
             let value = value
                 .trim()
                 .trim_end_matches(';')

@@ -91,15 +91,14 @@ fn summary(p: &Prediction) -> String {
             100.0 * r.band_coverage,
             significant(r.peak_error_n, 2)
         );
-        if let Some(m) = r.surface_shift_m {
-            let _ = writeln!(out, "    surface {:+.2} mm", 1e3 * m);
-        }
-        for (what, factor) in
-            [("force", r.force_factor), ("friction", r.friction_factor), ("puncture", r.puncture_factor)]
-        {
-            if let Some(factor) = factor {
-                let _ = writeln!(out, "    {what} x {}", significant(factor, 3));
-            }
+        let factors =
+            [("force", r.force_factor), ("friction", r.friction_factor), ("puncture", r.puncture_factor)];
+        let factors =
+            factors.iter().filter_map(|(what, x)| Some(format!("{what} x {}", significant((*x)?, 3))));
+        let surface = r.surface_shift_m.map(|m| format!("surface {:+.2} mm", 1e3 * m));
+        let fitted: Vec<String> = surface.into_iter().chain(factors).collect();
+        if !fitted.is_empty() {
+            let _ = writeln!(out, "    {}", fitted.join(", "));
         }
     }
     let _ = writeln!(
@@ -109,7 +108,11 @@ fn summary(p: &Prediction) -> String {
         p.band_includes.join(", ")
     );
     for b in &p.baselines {
-        let _ = writeln!(out, "  {}: {} N rms", b.name.replace('_', " "), significant(b.rmse_n, 3));
+        let what = match b.name.as_str() {
+            "mean_curve" => "mean curve of the recordings that made the model, at this speed",
+            _ => "mean of the recordings that made the model at other speeds, stretched",
+        };
+        let _ = writeln!(out, "  {what}: {} N rms", significant(b.rmse_n, 3));
     }
     if !p.held_out {
         let _ = writeln!(

@@ -6,11 +6,12 @@
 //! | module | contents |
 //! |---|---|
 //! | `insertion_course` | curves over advance, hold and retraction |
-//! | `training_summary` | what the recordings that made a law show about it |
+//! | `training_curves`, `training_summary` | what the recordings that made a law show about it |
 //! | `group_deviation` | how another group of recordings may differ, with spreads |
 //! | `group_update` | Gaussian update of a group's deviation |
 //! | `refit` | when a group's deviation is used |
-//! | `prepared`, `prediction_band`, `predicted_recording` | prediction of one recording |
+//! | `uncertainty`, `prediction_band` | draws of the next recording, and their band |
+//! | `prepared`, `target`, `predicted_recording` | prediction of one recording |
 
 mod group_deviation;
 mod group_update;
@@ -19,14 +20,17 @@ mod predicted_recording;
 mod prediction_band;
 mod prepared;
 mod refit;
+mod target;
+mod training_curves;
 mod training_summary;
+mod uncertainty;
 
 use crate::base_law_fit::assumptions_of;
 use crate::diagnosis_json::Diagnosis;
 use crate::error::DiagnoseError;
 use crate::input_checks::NamedRecording;
 pub use group_deviation::{Factor, Refit};
-use predicted_recording::{ErrorSums, Target};
+use predicted_recording::ErrorSums;
 pub use predicted_recording::{PredictionCurves, RecordingPrediction};
 pub use prediction_band::BAND_LEVEL;
 use prepared::Prepared;
@@ -35,7 +39,8 @@ use serde::{Deserialize, Serialize};
 use stylet_identify::model::Model;
 use stylet_scenario::Scenario;
 use stylet_stats::parallel::*;
-pub use training_summary::{TrainingRun, TrainingSummary};
+use target::Target;
+pub use training_curves::{TrainingRun, TrainingSummary};
 
 /// What is known about the recordings to predict.
 #[derive(Clone, Debug, Default)]

@@ -1,12 +1,13 @@
 //! Prediction of one recording.
 
-use super::group_deviation::{Factor, RATE_EXPONENT_SD, Values, deviating_model, group_sd};
+use super::group_deviation::{Factor, deviating_model, group_sd};
 use super::group_update::GroupEstimate;
-use super::insertion_course::{Curve, curve_of, value_at};
+use super::insertion_course::{Curve, value_at};
 use super::prediction_band::Band;
 use super::prepared::Prepared;
 use super::refit::RefittedGroup;
-use super::training_summary::{BaselineCurves, TrainingSummary};
+use super::target::{Target, with_unseen_speed};
+use super::training_curves::TrainingSummary;
 use crate::held_out::predict_free_run;
 use serde::{Deserialize, Serialize};
 use stylet_identify::model::{Model, NO_RUPTURE};
@@ -90,57 +91,6 @@ impl ErrorSums {
             stretched_mean: None,
         }
     }
-}
-
-/// A recording to predict.
-pub struct Target {
-    /// Its index.
-    r: usize,
-    /// Its index among the recordings that made the law.
-    pub training_index: Option<usize>,
-    /// Mean residual (N) of the others of these.
-    pub mean_residual: Curve,
-    /// Place of every block.
-    places: Vec<f64>,
-    baselines: BaselineCurves,
-}
-
-impl Target {
-    /// Recording `r`.
-    pub fn new(prepared: &Prepared, training: Option<&TrainingSummary>, r: usize) -> Self {
-        let (b, course) = (&prepared.data.recordings[r], &prepared.courses[r]);
-        let Some(t) = training else {
-            return Self {
-                r,
-                training_index: None,
-                mean_residual: Curve::new(),
-                places: Vec::new(),
-                baselines: BaselineCurves::default(),
-            };
-        };
-        let places = course.places(b, t.range, 0.0);
-        let training_index = t.index_of(&curve_of(&places, &b.used, &b.force_n));
-        let (speed, stroke) = (course.speed_mps, course.range.deepest_m);
-        Self {
-            r,
-            mean_residual: t.mean_residual(speed, stroke, training_index),
-            baselines: t.baselines(speed, stroke, training_index),
-            training_index,
-            places,
-        }
-    }
-}
-
-/// Spreads between groups, widened for a speed that the law was not made with.
-pub fn with_unseen_speed(
-    mut sd: Values,
-    prepared: &Prepared,
-    training: Option<&TrainingSummary>,
-    r: usize,
-) -> Values {
-    let ln_ratio = training.map_or(0.0, |t| t.ln_speed_ratio(prepared.courses[r].speed_mps));
-    sd[1] = sd[1].hypot(RATE_EXPONENT_SD * ln_ratio);
-    sd
 }
 
 /// Predicts one recording; `group` is its refitted group.

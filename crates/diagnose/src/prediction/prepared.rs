@@ -2,8 +2,8 @@
 
 use super::group_deviation::{Values, deviating_model};
 use super::insertion_course::{Curve, InsertionCourse, value_at};
-use super::prediction_band::{Uncertainty, free_run_force};
-use super::training_summary::TrainingSummary;
+use super::training_curves::TrainingSummary;
+use super::uncertainty::{Uncertainty, free_run_force};
 use crate::base_law_fit::assumptions_of;
 use crate::diagnosis_json::Diagnosis;
 use crate::input_checks::{NamedRecording, clean_recordings};

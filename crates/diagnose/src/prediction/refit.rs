@@ -2,9 +2,9 @@
 
 use super::group_deviation::{Factor, PARAMETERS, RECORDING_SD, Refit, Values, group_sd};
 use super::group_update::{GroupEstimate, Observation, RecordingEstimate, estimate_recording};
-use super::predicted_recording::{Target, with_unseen_speed};
 use super::prepared::Prepared;
-use super::training_summary::TrainingSummary;
+use super::target::{Target, with_unseen_speed};
+use super::training_curves::TrainingSummary;
 use serde::{Deserialize, Serialize};
 use stylet_stats::parallel::*;
 

@@ -83,8 +83,12 @@ pub fn group_sentence(p: &Prediction) -> String {
 pub fn refit_sentence(p: &Prediction) -> Option<String> {
     let refit = p.refit.as_ref()?;
     let errors = format!(
-        "RMS error of the {} fitted recording(s) {} N without and {} N with it",
-        refit.recordings,
+        "RMS error of the {} (means over 20 ms) {} N without and {} N with it",
+        if refit.recordings == 1 {
+            "fitted recording".to_owned()
+        } else {
+            format!("{} fitted recordings", refit.recordings)
+        },
         significant(refit.before_n, 3),
         significant(refit.after_n, 3)
     );
@@ -144,7 +148,12 @@ fn overview(found: &PredictionResult) -> Section {
             format!("{:.0} %", 100.0 * p.band_coverage),
             format!("nominal 90 %; the band includes {}", p.band_includes.join(", ")),
         )
-        .status(Status::at_most((p.band_coverage - 0.9).abs(), 0.06, 0.15)),
+        .status(if p.varying.is_empty() {
+            Status::at_most((p.band_coverage - 0.9).abs(), 0.06, 0.15)
+        } else {
+            // The band of an unseen group may be wider than one group needs.
+            Status::at_most(0.9 - p.band_coverage, 0.1, 0.2)
+        }),
     ];
     if let Some(before) = p.assumed_rmse_n {
         tiles.push(Tile::new(

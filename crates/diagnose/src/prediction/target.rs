@@ -1,0 +1,58 @@
+//! A recording to predict, compared with those that made the law.
+
+use super::group_deviation::{RATE_EXPONENT_SD, Values};
+use super::insertion_course::{Curve, curve_of};
+use super::prepared::Prepared;
+use super::training_curves::{BaselineCurves, TrainingSummary};
+
+/// A recording to predict.
+pub struct Target {
+    /// Its index.
+    pub r: usize,
+    /// Its index among the recordings that made the law.
+    pub training_index: Option<usize>,
+    /// Mean residual (N) of the others of these.
+    pub mean_residual: Curve,
+    /// Place of every block.
+    pub places: Vec<f64>,
+    /// Predictions without a model.
+    pub baselines: BaselineCurves,
+}
+
+impl Target {
+    /// Recording `r`.
+    pub fn new(prepared: &Prepared, training: Option<&TrainingSummary>, r: usize) -> Self {
+        let (b, course) = (&prepared.data.recordings[r], &prepared.courses[r]);
+        let Some(t) = training else {
+            return Self {
+                r,
+                training_index: None,
+                mean_residual: Curve::new(),
+                places: Vec::new(),
+                baselines: BaselineCurves::default(),
+            };
+        };
+        let places = course.places(b, t.range, 0.0);
+        let training_index = t.index_of(&curve_of(&places, &b.used, &b.force_n));
+        let (speed, stroke) = (course.speed_mps, course.range.deepest_m);
+        Self {
+            r,
+            mean_residual: t.mean_residual(speed, stroke, training_index),
+            baselines: t.baselines(speed, stroke, training_index),
+            training_index,
+            places,
+        }
+    }
+}
+
+/// Spreads between groups, widened for a speed that the law was not made with.
+pub fn with_unseen_speed(
+    mut sd: Values,
+    prepared: &Prepared,
+    training: Option<&TrainingSummary>,
+    r: usize,
+) -> Values {
+    let ln_ratio = training.map_or(0.0, |t| t.ln_speed_ratio(prepared.courses[r].speed_mps));
+    sd[1] = sd[1].hypot(RATE_EXPONENT_SD * ln_ratio);
+    sd
+}
