@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn filtered_and_zipped_items_are_those_of_the_sequential_iterator() {
-        let values = vec![3.0, 1.0, 2.0];
+        let values = [3.0, 1.0, 2.0];
         let kept: Vec<(usize, f64)> = values
             .par_iter()
             .zip(["a", "b", "c"])

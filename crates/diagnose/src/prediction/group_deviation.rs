@@ -26,7 +26,7 @@ pub enum Refit {
 }
 
 impl Refit {
-    /// All, in the order of [`Values`].
+    /// All, in the order of the deviations: surface, force, friction, puncture force.
     pub const ALL: [Self; PARAMETERS] = [Self::Surface, Self::Force, Self::Friction, Self::Puncture];
 }
 
