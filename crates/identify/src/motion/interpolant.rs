@@ -2,7 +2,7 @@
 
 use super::jump_timing::JumpTiming;
 
-/// Position and velocity, linear between knots.
+/// Position and velocity between knots.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Interpolant {
     /// Time in s, non-decreasing; repeated at a velocity jump.
@@ -15,14 +15,14 @@ pub(super) struct Interpolant {
     sum_z: Vec<f64>,
     /// Integral of the velocity in m up to each knot.
     sum_v: Vec<f64>,
-    /// Whether the velocity is that of the positions: between knots the motion then is a cubic, and the integral of the velocity a difference of
-    /// positions.
-    exact: bool,
+    /// Whether positions and velocities are precise enough for a cubic between knots; the integral of the velocity then is the difference of
+    /// positions. Otherwise both are linear, so that position noise does not enter the mean velocity.
+    cubic: bool,
 }
 
 impl Interpolant {
-    pub(super) fn new(exact: bool) -> Self {
-        Self { exact, ..Self::default() }
+    pub(super) fn new(cubic: bool) -> Self {
+        Self { cubic, ..Self::default() }
     }
 
     pub(super) fn push(&mut self, t: f64, z: f64, v: f64) {
@@ -30,7 +30,7 @@ impl Interpolant {
         if let (Some(t0), Some(z0), Some(v0)) = (self.t.last(), self.z.last(), self.v.last()) {
             let dt = t - t0;
             sum_z = self.sum_z.last().unwrap_or(&0.0) + 0.5 * dt * (z0 + z);
-            let travel = if self.exact && dt > 0.0 { z - z0 } else { 0.5 * dt * (v0 + v) };
+            let travel = if self.cubic && dt > 0.0 { z - z0 } else { 0.5 * dt * (v0 + v) };
             sum_v = self.sum_v.last().unwrap_or(&0.0) + travel;
         }
         self.t.push(t);
@@ -84,7 +84,7 @@ impl Interpolant {
         let step = self.t[k + 1] - self.t[k];
         let share = dt / step;
         let mix = |x: &[f64]| x[k] + 0.5 * share * (x[k + 1] - x[k]);
-        let travel = if self.exact {
+        let travel = if self.cubic {
             // Hermite's cubic from positions and velocities at both knots.
             let (v0, v1, mean) = (self.v[k], self.v[k + 1], (self.z[k + 1] - self.z[k]) / step);
             dt * (v0 + share * (3.0 * mean - 2.0 * v0 - v1 + share * (v0 + v1 - 2.0 * mean)))

@@ -59,6 +59,7 @@ impl Motion {
         let estimate = estimate_velocity(t, z);
         let recorded_sd = stylet_stats::third_difference_sd([recording.velocity_mps.as_slice()]);
         let mut noise_m = position_noise(t, z);
+        let precise = estimate.precise_positions;
         let (z, v, jumps, sd) = if estimate.sd_mps <= MAX_EXACT_SD_MPS {
             noise_m = noise_m.min(1e-6);
             (z.clone(), estimate.velocity_mps, estimate.jumps, estimate.sd_mps)
@@ -73,9 +74,9 @@ impl Motion {
                 ..*k
             };
             let jumps: Vec<VelocityJump> = jumps.iter().map(sides).collect();
-            return Self::from_knots(t, &z, v, &jumps, recorded_sd, noise_m, still_mps);
+            return Self::from_knots(t, &z, v, &jumps, (recorded_sd, false), noise_m, still_mps);
         }
-        Self::from_knots(t, &z, &v, &jumps, sd, noise_m, still_mps)
+        Self::from_knots(t, &z, &v, &jumps, (sd, precise), noise_m, still_mps)
     }
 
     fn from_knots(
@@ -83,14 +84,13 @@ impl Motion {
         z: &[f64],
         v: &[f64],
         jumps: &[VelocityJump],
-        sd: f64,
+        (sd, precise): (f64, bool),
         noise_m: f64,
         still_mps: f64,
     ) -> Self {
-        let exact = sd <= MAX_EXACT_SD_MPS;
         let mut m = Self {
-            exact: Interpolant::new(exact),
-            sampled: Interpolant::new(exact),
+            exact: Interpolant::new(precise),
+            sampled: Interpolant::new(precise),
             velocity_sd_mps: sd,
             noise_m,
             ..Self::default()
@@ -120,7 +120,7 @@ impl Motion {
             m.sampled.push(t[i], z[i], v[i]);
         }
         // Noisy positions do not distinguish a reversal from a hold.
-        if exact {
+        if sd <= MAX_EXACT_SD_MPS {
             m.find_reversals(t, still_mps);
         }
         m
@@ -177,7 +177,7 @@ mod tests {
         sd: f64,
         noise_m: f64,
     ) -> Motion {
-        Motion::from_knots(t, z, v, jumps, sd, noise_m, STILL_MPS)
+        Motion::from_knots(t, z, v, jumps, (sd, sd == 0.0), noise_m, STILL_MPS)
     }
 
     /// 2 m/s, from 0.53 s on back at 1 m/s, sampled every 0.1 s up to 1.2 s.

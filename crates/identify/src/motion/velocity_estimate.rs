@@ -42,6 +42,9 @@ pub struct VelocityEstimate {
     pub velocity_mps: Vec<f64>,
     /// Standard deviation in m/s due to position noise.
     pub sd_mps: f64,
+    /// Whether single positions are precise enough for derivatives of higher order: the position noise is at most that of a velocity of
+    /// 5e-6 m/s between two samples, as in simulated recordings. Measured positions are not.
+    pub precise_positions: bool,
     /// Velocity jumps.
     pub jumps: Vec<VelocityJump>,
 }
@@ -51,13 +54,14 @@ pub struct VelocityEstimate {
 pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
     let n = t.len().min(z.len());
     if n < 8 {
-        return VelocityEstimate { velocity_mps: vec![0.0; n], sd_mps: f64::INFINITY, jumps: Vec::new() };
+        return VelocityEstimate { velocity_mps: vec![0.0; n], sd_mps: f64::INFINITY, ..VelocityEstimate::default() };
     }
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
     let step = median(&mut steps).max(1e-9);
     let noise_m = position_noise(t, z);
     // Slope of a line over 2 m + 1 samples: sd = noise / (step sqrt(m (m+1) (2m+1) / 3)).
     let gain = |m: usize| 1.0 / (step * ((m * (m + 1) * (2 * m + 1)) as f64 / 3.0).sqrt());
+    let precise_positions = core::f64::consts::SQRT_2 * noise_m <= TARGET_SD_MPS * step;
     let half = (1..MAX_HALF_WINDOW).find(|m| noise_m * gain(*m) <= TARGET_SD_MPS).unwrap_or(MAX_HALF_WINDOW);
     let side = (2 * half + 2).max(6);
     // Slope at the end of a parabola over `side` samples: sd = noise sqrt(192/side^3)/step. Five of them.
@@ -86,7 +90,7 @@ pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
         let (from, to) = (piece[0], piece[1]);
         for i in from..to {
             let reach = half.min(i - from).min(to - 1 - i);
-            if half <= 2 && i >= from + 2 && i + 2 < to && noise_m * QUARTIC_GAIN <= TARGET_SD_MPS * step {
+            if i >= from + 2 && i + 2 < to && precise_positions {
                 v[i] = quartic_slope(&t[i - 2..=i + 2], &z[i - 2..=i + 2]);
                 continue;
             }
@@ -101,7 +105,7 @@ pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
             v[i] = slope_at(&t[lo..hi], &z[lo..hi], t[i]);
         }
     }
-    VelocityEstimate { velocity_mps: v, sd_mps: noise_m * gain(half), jumps }
+    VelocityEstimate { velocity_mps: v, sd_mps: noise_m * gain(half), precise_positions, jumps }
 }
 
 /// Standard deviation of position noise from third divided differences, which are insensitive to irregular
@@ -242,9 +246,6 @@ pub(super) fn fit_parabola(t: &[f64], z: &[f64], at: f64) -> ([f64; 3], f64) {
     let off = t.iter().zip(z).map(left).sum();
     ([x[0] + base, x[1] / span, x[2] / (span * span)], off)
 }
-
-/// Noise of [`quartic_slope`] for evenly spaced samples, per sampling interval.
-const QUARTIC_GAIN: f64 = 0.95;
 
 /// Slope at the middle of five samples, of the quartic through them: the bias of a narrower parabola is a thousandth of the velocity at 2 Hz.
 fn quartic_slope(t: &[f64], z: &[f64]) -> f64 {
