@@ -19,8 +19,11 @@ struct DiagnoseOutput {
 
 fn diagnose(folder: &Path, set: &str, threads: &str) -> DiagnoseOutput {
     let scratch = Scratch::new(&format!("repeats-{set}-{threads}"));
+    diagnose_file(folder, &root().join("scenarios/measured").join(format!("{set}.ron")), threads, &scratch)
+}
+
+fn diagnose_file(folder: &Path, set: &Path, threads: &str, scratch: &Scratch) -> DiagnoseOutput {
     let out = scratch.path().join("out");
-    let set = root().join("scenarios/measured").join(format!("{set}.ron"));
     let output = std::process::Command::new(env!("CARGO_BIN_EXE_stylet"))
         .args(["diagnose", set.to_str().expect("a path"), "--out", out.to_str().expect("a path")])
         .env("STYLET_MEASURED", folder)
@@ -50,6 +53,26 @@ fn number(value: &serde_json::Value) -> f64 {
 
 fn causes(json: &serde_json::Value) -> Vec<&str> {
     json["causes"].as_array().expect("causes").iter().filter_map(|c| c["effect"].as_str()).collect()
+}
+
+/// The only promise on sets that is short enough for continuous integration.
+#[test]
+fn three_insertions_predict_each_other_at_the_floor() {
+    let Some(folder) = measured("three_insertions_predict_each_other_at_the_floor", "needle_phantom") else {
+        return;
+    };
+    let scratch = Scratch::new("three-insertions");
+    let whole = std::fs::read_to_string(root().join("scenarios/measured/muscle.ron")).expect("the set");
+    let run = |k: u8| format!("\"needle_phantom/muscle_2mmps_run{k}.csv\"");
+    let three = whole.replace("\"needle_phantom/muscle_2mmps_*.csv\"", &[1, 2, 3].map(run).join(", "));
+    assert_ne!(whole, three);
+    let set = scratch.path().join("three.ron");
+    std::fs::write(&set, three).expect("written");
+    let output = diagnose_file(&folder, &set, "2", &scratch);
+    let mean = &output.json["repeats"]["mean"];
+    assert_eq!(output.json["repeats"]["recordings"].as_array().map(Vec::len), Some(3));
+    assert!((number(&mean["floor_n"]) - 0.267).abs() < 0.005, "{mean}");
+    assert!(number(&mean["model_n"]) <= number(&mean["floor_n"]), "{mean}");
 }
 
 #[test]

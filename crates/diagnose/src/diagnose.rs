@@ -209,7 +209,7 @@ pub(crate) fn diagnose_given_layers(
         let hidden = not_identifiable(&search.best, &search.data, &visible);
         (visible, hidden)
     };
-    let with_tones = |error_n: f64| error_n.hypot(named_tones_n);
+    let with_tones = |error_n: f64| libm::hypot(error_n, named_tones_n);
     let gain = Gain {
         held_out: recordings.len() > 1,
         recordings: recordings.iter().map(|r| r.name.clone()).collect(),

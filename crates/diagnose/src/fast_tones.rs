@@ -295,7 +295,7 @@ fn fitted(samples: &[Samples], hz: f64, variance: f64) -> (FastTone, Vec<Vec<f64
         bound.max(scatter * (DEPENDENT_WINDOWS / steps.len().max(1) as f64).sqrt())
     };
     let relative =
-        (amplitude_sd / amplitude.max(1e-300)).hypot(TAU * mid / information.max(1.0) * frequency_sd);
+        libm::hypot(amplitude_sd / amplitude.max(1e-300), TAU * mid / information.max(1.0) * frequency_sd);
     let phase_rad = common_phase(&phases)
         .filter(|_| is_stable)
         .map_or_else(|| (phases.first().map_or(0.0, |p| p.0), f64::INFINITY), |phase| (phase, relative));

@@ -101,7 +101,7 @@ fn excess(data: &FitData, e: &[Vec<f64>]) -> f64 {
 /// p-value of a tone with `excess` times the power of all other frequencies together, in white noise (Fisher 1929).
 fn tone_p_value(excess: f64, blocks: usize) -> f64 {
     let bins = 0.5 * blocks as f64;
-    (bins * (1.0 + excess).powf(1.0 - bins)).clamp(f64::MIN_POSITIVE, 1.0)
+    (bins * libm::pow(1.0 + excess, 1.0 - bins)).clamp(f64::MIN_POSITIVE, 1.0)
 }
 
 /// Assesses the residual and the effects of a finished selection. When the residual has tones, the search continues with

@@ -148,11 +148,11 @@ impl ZeroStepReport {
             search.data.with_estimated_noise(&search.best.residuals.residual_n, NoiseSource::LongMemory);
         let zeros = recorded_zeros(search, &step_sds(&search.best, &data));
         let noise_n = search.data.noise.sd_n();
-        let right = |level_n: f64, sd_n: f64| level_n.abs() < Z95 * noise_n.hypot(sd_n);
+        let right = |level_n: f64, sd_n: f64| level_n.abs() < Z95 * libm::hypot(noise_n, sd_n);
         let is_right_later = |z: &RecordedZero| {
             let (mut level, mut sd) = z.offset_n;
             z.steps.iter().any(|(s, step_sd)| {
-                (level, sd) = (level + s.size_n, sd.hypot(*step_sd));
+                (level, sd) = (level + s.size_n, libm::hypot(sd, *step_sd));
                 right(level, sd)
             })
         };
@@ -190,7 +190,7 @@ fn widen(cause: &mut Cause, other: &Cause) {
     for (path, e) in &mut cause.parameters {
         let half = |e: &Estimate| 0.5 * (e.high - e.low);
         let Some(other) = other.parameters.get(path) else { continue };
-        let half = half(e).hypot(half(other));
+        let half = libm::hypot(half(e), half(other));
         (e.low, e.high) = (e.value - half, e.value + half);
     }
 }

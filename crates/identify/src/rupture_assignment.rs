@@ -46,14 +46,14 @@ fn expected_ruptures(model: &Model, trust: f64) -> Vec<ExpectedRupture> {
             (front + stretch, (variance + stretch_sd * stretch_sd).sqrt())
         } else if stretch.is_finite() {
             // Either condition may come first.
-            (by_face, face_sd.hypot(0.3 * stretch_sd))
+            (by_face, libm::hypot(face_sd, 0.3 * stretch_sd))
         } else {
             (by_face, face_sd)
         };
         out.push(ExpectedRupture {
             front_m: front,
             position_m: place_m,
-            sd_m: (trust * sd).hypot(2e-4 + 0.01 * layer.thickness_m),
+            sd_m: libm::hypot(trust * sd, 2e-4 + 0.01 * layer.thickness_m),
             stiffness_n_per_m: layer.stiffness_n_per_m,
         });
         front = by_face;

@@ -162,7 +162,7 @@ impl Change {
                 | Number::AbdomenFriction => layer.friction_ns_per_m2 *= factor,
                 Number::GelContrast => {
                     let ratio = layer.friction_ns_per_m2 / MIDDLE_NS_PER_M2;
-                    layer.friction_ns_per_m2 = MIDDLE_NS_PER_M2 * ratio.powf(factor);
+                    layer.friction_ns_per_m2 = MIDDLE_NS_PER_M2 * libm::pow(ratio, factor);
                 }
                 Number::Latex | Number::LiverPuncture => {
                     layer.puncture_n = layer.puncture_n.map(|f| f * factor);

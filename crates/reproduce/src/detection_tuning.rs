@@ -70,7 +70,7 @@ impl Tuning {
             let aim = rms(&best, Ablation::None);
             let off = |below: f64| {
                 let tried = Tuning { trace_below: below, ..best };
-                (rms(&tried, Ablation::Trace) / aim).ln().abs()
+                libm::log(rms(&tried, Ablation::Trace) / aim).abs()
             };
             let distances = TRACE_BELOW.map(off);
             let nearest = distances.iter().zip(TRACE_BELOW).min_by(|a, b| a.0.total_cmp(b.0));

@@ -48,7 +48,7 @@ impl Scale {
         }
         let n = some.len() as f64;
         match self {
-            Scale::Ratio => Some((some.iter().map(|x| x.ln()).sum::<f64>() / n).exp()),
+            Scale::Ratio => Some(libm::exp(some.iter().map(|x| libm::log(*x)).sum::<f64>() / n)),
             Scale::SmallestRatio => {
                 (some.len() == values.len()).then(|| some.iter().copied().fold(f64::INFINITY, f64::min))
             }

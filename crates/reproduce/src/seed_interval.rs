@@ -19,9 +19,9 @@ pub fn geometric_mean(values: &[f64]) -> Option<Interval> {
     if values.iter().any(|x| *x <= 0.0) {
         return None;
     }
-    let logarithms: Vec<f64> = values.iter().map(|x| x.ln()).collect();
+    let logarithms: Vec<f64> = values.iter().map(|x| libm::log(*x)).collect();
     let i = mean(&logarithms)?;
-    Some(Interval { value: i.value.exp(), low: i.low.exp(), high: i.high.exp() })
+    Some(Interval { value: libm::exp(i.value), low: libm::exp(i.low), high: libm::exp(i.high) })
 }
 
 /// Share with its Wilson interval; a seed may count in part, when it holds several experiments.

@@ -173,7 +173,7 @@ impl Errors {
 
     /// Log odds in nats of a start in the tissue, when the air's errors have this variance.
     fn nats(&self, air_n2: f64) -> f64 {
-        if self.loaded_n2 > 0.0 { 0.5 * self.independent * (air_n2 / self.loaded_n2).ln() } else { 0.0 }
+        if self.loaded_n2 > 0.0 { 0.5 * self.independent * libm::log(air_n2 / self.loaded_n2) } else { 0.0 }
     }
 }
 

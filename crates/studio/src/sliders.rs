@@ -36,7 +36,7 @@ pub fn named(number: &str) -> (&str, &'static str, f64) {
 
 fn spread(low: f64, high: f64, log: bool) -> Vec<f64> {
     let at = |share: f64| match log && low > 0.0 {
-        true => low * (high / low).powf(share),
+        true => low * libm::pow(high / low, share),
         false => low + (high - low) * share,
     };
     (0..POSITIONS).map(|k| rounded(at(k as f64 / (POSITIONS - 1) as f64))).collect()

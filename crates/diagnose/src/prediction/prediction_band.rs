@@ -49,7 +49,7 @@ impl Band<'_> {
                 prepared.force_of(&model, self.training, r, &at, self.mean_residual)
             })
             .collect();
-        band_edges(&draws, |k| self.misfit_sd_n(k, is_unseen).hypot(extra_misfit_n))
+        band_edges(&draws, |k| libm::hypot(self.misfit_sd_n(k, is_unseen), extra_misfit_n))
     }
 
     /// Standard deviation (N) of noise and misfit in block `k`.
@@ -58,7 +58,7 @@ impl Band<'_> {
         let Some((t, place)) = self.training.zip(self.places.get(k)) else { return noise_n };
         let of = |curve: &Curve| value_at(curve, *place).unwrap_or(0.0);
         let missing_n = if is_unseen { of(self.mean_residual) } else { 0.0 };
-        noise_n.hypot(of(&t.discrepancy_sd_n)).hypot(missing_n)
+        libm::hypot(libm::hypot(noise_n, of(&t.discrepancy_sd_n)), missing_n)
     }
 }
 

@@ -101,8 +101,9 @@ impl GroupRefit {
         let group_sd: Values = std::array::from_fn(|k| if is_free(k) { wide[k] } else { 0.0 });
         let recording_sd = training.map_or(RECORDING_SD, |t| t.recording_sd);
         // A recording deviates from the law by its group's deviation and by its own.
-        let prior_sd: Values =
-            std::array::from_fn(|k| if group_sd[k] > 0.0 { group_sd[k].hypot(recording_sd[k]) } else { 0.0 });
+        let prior_sd: Values = std::array::from_fn(|k| {
+            if group_sd[k] > 0.0 { libm::hypot(group_sd[k], recording_sd[k]) } else { 0.0 }
+        });
         let estimates: Vec<RecordingEstimate> = fitted
             .par_iter()
             .map(|r| {

@@ -53,6 +53,6 @@ pub fn with_unseen_speed(
     r: usize,
 ) -> Values {
     let ln_ratio = training.map_or(0.0, |t| t.ln_speed_ratio(prepared.courses[r].speed_mps));
-    sd[1] = sd[1].hypot(RATE_EXPONENT_SD * ln_ratio);
+    sd[1] = libm::hypot(sd[1], RATE_EXPONENT_SD * ln_ratio);
     sd
 }

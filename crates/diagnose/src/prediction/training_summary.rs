@@ -95,7 +95,7 @@ pub(super) fn summarise(prepared: &Prepared) -> Option<TrainingSummary> {
         let each = (0..n).into_par_iter().map(|r| {
             let b = &data.recordings[r];
             let sd_n = |k: usize| {
-                uncertainty.block_n.hypot(scale * value_at(&discrepancy, places[r][k]).unwrap_or(0.0))
+                libm::hypot(uncertainty.block_n, scale * value_at(&discrepancy, places[r][k]).unwrap_or(0.0))
             };
             let (low, high) = band_edges(&draws[r], sd_n);
             // The band lies about the law; the mean residual moves both.

@@ -77,8 +77,8 @@ impl PredictedForce {
         for ((mean, sd), (low, high)) in
             self.mean_n.iter().zip(sd_n).zip(self.low_n.iter_mut().zip(&mut self.high_n))
         {
-            *low = mean - (mean - *low).hypot(Z90 * sd);
-            *high = mean + (*high - mean).hypot(Z90 * sd);
+            *low = mean - libm::hypot(mean - *low, Z90 * sd);
+            *high = mean + libm::hypot(*high - mean, Z90 * sd);
         }
     }
 }

@@ -172,7 +172,7 @@ fn residual_quantiles(residuals_n: &[f64], noise_n: f64) -> [f64; QUANTILES] {
     std::array::from_fn(|k| {
         let share = ((2 * k + 1) as f64 / QUANTILES as f64 - 1.0).abs();
         let size = if sizes.is_empty() { 0.0 } else { quantile_of_sorted(&sizes, share) };
-        size.hypot(noise[k]).copysign(noise[k]) * f64::from(u8::from(2 * k + 1 != QUANTILES))
+        libm::hypot(size, noise[k]).copysign(noise[k]) * f64::from(u8::from(2 * k + 1 != QUANTILES))
     })
 }
 

@@ -249,6 +249,26 @@ mod tests {
     }
 
     #[test]
+    fn position_noise_does_not_enter_the_mean_velocity_between_two_samples() {
+        // 3 mm/s; alternating errors of 0.1 um are 40 um/s between two samples, more than the velocity's uncertainty.
+        let t: Vec<f64> = (0..600).map(|k| f64::from(k) * 0.005).collect();
+        let z: Vec<f64> = t
+            .iter()
+            .enumerate()
+            .map(|(k, t)| 0.003 * t + 1e-7 * (1.7 * (k * k % 101) as f64).sin())
+            .collect();
+        let r =
+            Recording::with_velocity(t.clone(), z, vec![0.003; 600], vec![0.0; 600]).expect("a recording");
+        let m = Motion::from_recording(&r, STILL_MPS);
+        let mut near = 0;
+        let travel: Vec<f64> = t.iter().map(|t| m.sampled.integrals(*t, &mut near).1).collect();
+        let errors: Vec<f64> = travel.windows(2).map(|w| (w[1] - w[0]) / 0.005 - 0.003).collect();
+        let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+        assert!(m.velocity_sd_mps < MAX_EXACT_SD_MPS, "{}", m.velocity_sd_mps);
+        assert!(rms < 2.0 * m.velocity_sd_mps, "{rms} with {}", m.velocity_sd_mps);
+    }
+
+    #[test]
     fn a_measured_velocity_is_used_when_it_is_more_accurate() {
         let t: Vec<f64> = (0..600).map(|k| f64::from(k) * 0.005).collect();
         // Noisy positions; slower from 1.5 s on.

@@ -58,7 +58,7 @@ pub fn smooth_positions(t: &[f64], z: &[f64]) -> SmoothedMotion {
     let dt = step * q as f64;
     // Slope at the end of a parabola over `side` cells: sd = noise sqrt(192/side^3)/dt; six of the difference
     // of two.
-    let jump_sd = 6.0 * 2.0_f64.sqrt() * 13.9 * noise_m / (dt * (JUMP_SIDE_CELLS as f64).powf(1.5));
+    let jump_sd = 6.0 * 2.0_f64.sqrt() * 13.9 * noise_m / (dt * libm::pow(JUMP_SIDE_CELLS as f64, 1.5));
     let found = slope_breaks(&tc, &zc, JUMP_SIDE_CELLS, (1.8 * dt, 1.8 * dt), jump_sd);
     let mut edges: Vec<usize> = found.iter().map(|b| b.0).collect();
     edges.extend([0, cells]);
@@ -109,7 +109,7 @@ fn jump_between(
     {
         // Standard error at the end of a curved segment over that many cells.
         let end = |s: &SmoothInterval, c: &MotionSegment| 3.0 * c.sd_m / ((s.to - s.from) as f64).sqrt();
-        let sd_m = end(left, a).hypot(end(right, b));
+        let sd_m = libm::hypot(end(left, a), end(right, b));
         return jump(at, 0.5 * (a.at(at).0 + b.at(at).0), [a.at(at).1, b.at(at).1], sd_m);
     }
     match found.iter().find(|b| b.0 == right.from) {

@@ -54,7 +54,11 @@ pub struct VelocityEstimate {
 pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
     let n = t.len().min(z.len());
     if n < 8 {
-        return VelocityEstimate { velocity_mps: vec![0.0; n], sd_mps: f64::INFINITY, ..VelocityEstimate::default() };
+        return VelocityEstimate {
+            velocity_mps: vec![0.0; n],
+            sd_mps: f64::INFINITY,
+            ..VelocityEstimate::default()
+        };
     }
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
     let step = median(&mut steps).max(1e-9);
@@ -65,7 +69,7 @@ pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
     let half = (1..MAX_HALF_WINDOW).find(|m| noise_m * gain(*m) <= TARGET_SD_MPS).unwrap_or(MAX_HALF_WINDOW);
     let side = (2 * half + 2).max(6);
     // Slope at the end of a parabola over `side` samples: sd = noise sqrt(192/side^3)/step. Five of them.
-    let jump_sd = 70.0 * noise_m / (step * (side as f64).powf(1.5));
+    let jump_sd = 70.0 * noise_m / (step * libm::pow(side as f64, 1.5));
     let mut edges: Vec<usize> = vec![0];
     edges.extend((1..n).filter(|i| t[*i] - t[i - 1] > MAX_GAP_STEPS * step));
     edges.push(n);

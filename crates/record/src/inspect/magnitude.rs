@@ -66,7 +66,7 @@ pub fn propose_units(dimension: Dimension, magnitude: f64) -> Vec<UnitProposal> 
         .map(|(unit, scale, rarity)| {
             let value = scale * magnitude;
             (
-                rarity + (value / typical).ln().abs(),
+                rarity + libm::log(value / typical).abs(),
                 UnitProposal { unit: (*unit).to_owned(), scale: *scale, value },
             )
         })

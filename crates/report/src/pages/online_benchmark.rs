@@ -97,7 +97,7 @@ fn curve_chart(
     chart.parametric = true;
     for (k, s) in scores.iter().filter(|s| !s.curve.is_empty()).enumerate() {
         let points: Vec<(f64, f64)> = (0..s.curve.len())
-            .filter_map(|i| Some((s.curve[i].false_per_hour.max(0.1).log10(), y(s, i)?)))
+            .filter_map(|i| Some((libm::log10(s.curve[i].false_per_hour.max(0.1)), y(s, i)?)))
             .collect();
         let (x, y) = points.into_iter().unzip();
         chart = chart.with_series(Series::line(&s.entrant, COLOURS[k % COLOURS.len()], x, y));

@@ -109,7 +109,7 @@ pub fn refit_sentence(p: &Prediction) -> Option<String> {
 }
 
 fn factor_text(name: &str, ln_factor: f64, sd: f64) -> String {
-    let at = |sds: f64| significant((ln_factor + sds * sd).exp(), 3);
+    let at = |sds: f64| significant(libm::exp(ln_factor + sds * sd), 3);
     format!("{name} x {} ({} to {})", at(0.0), at(-stylet_stats::Z95), at(stylet_stats::Z95))
 }
 

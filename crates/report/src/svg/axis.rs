@@ -16,7 +16,7 @@ pub(super) fn axis_ticks(low: f64, high: f64, count: usize) -> Vec<f64> {
         return Vec::new();
     }
     let raw = span / count as f64;
-    let power = 10f64.powf(raw.log10().floor());
+    let power = libm::pow(10.0, libm::floor(libm::log10(raw)));
     let step =
         [1.0, 2.0, 5.0, 10.0].iter().map(|m| m * power).find(|s| *s >= raw * 0.999).unwrap_or(10.0 * power);
     let first = (low / step - 1e-9).ceil() as i64;

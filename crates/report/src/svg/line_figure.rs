@@ -39,7 +39,7 @@ fn bend(scale: Scale, y: f64) -> f64 {
         Scale::Linear => y,
         Scale::Log => {
             if y > 0.0 {
-                y.log10()
+                libm::log10(y)
             } else {
                 f64::NAN
             }

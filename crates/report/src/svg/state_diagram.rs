@@ -65,7 +65,7 @@ pub fn state_machine(diagram: &Diagram, options: &FigureOptions) -> String {
 
 fn draw(canvas: &mut Canvas, arrow: &Arrow, from: (f64, f64), to: (f64, f64)) {
     let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-    let length = dx.hypot(dy).max(1e-9);
+    let length = libm::hypot(dx, dy).max(1e-9);
     let left = (dy / length, -dx / length);
     let middle = (
         f64::midpoint(from.0, to.0) + left.0 * arrow.bend_px,
@@ -90,7 +90,7 @@ fn draw(canvas: &mut Canvas, arrow: &Arrow, from: (f64, f64), to: (f64, f64)) {
         (points.last(), points.len().checked_sub(6).and_then(|i| points.get(i)))
     {
         let (ux, uy) = (tip.0 - before.0, tip.1 - before.1);
-        let norm = ux.hypot(uy).max(1e-9);
+        let norm = libm::hypot(ux, uy).max(1e-9);
         let (ux, uy) = (ux / norm, uy / norm);
         let back = (tip.0 - 11.0 * ux, tip.1 - 11.0 * uy);
         let head = vec![(back.0 - 5.0 * uy, back.1 + 5.0 * ux), *tip, (back.0 + 5.0 * uy, back.1 - 5.0 * ux)];

@@ -236,7 +236,7 @@ pub(super) fn base_law_residual(
     let chart = Chart::new("Spectrum of the residual", "log10 of frequency (Hz)", "N/sqrt(Hz)")
         .caption("Amplitude spectral density at the sampling rate of the recordings, averaged over recordings; the largest value of each 1/50 decade is drawn.")
         .height(240);
-    let log: Vec<f64> = pick(&f).iter().map(|f| f.log10()).collect();
+    let log: Vec<f64> = pick(&f).iter().map(|f| libm::log10(*f)).collect();
     section.chart(Chart {
         scale: Scale::Log,
         ..chart
@@ -249,7 +249,7 @@ pub(super) fn base_law_residual(
 fn thin(f: &[f64], value: &[f64]) -> Vec<usize> {
     let mut kept: Vec<(i64, usize)> = Vec::new();
     for (k, f) in f.iter().enumerate().filter(|(_, f)| **f > 0.01) {
-        let bin = (f.log10() * 50.0).floor() as i64;
+        let bin = libm::floor(libm::log10(*f) * 50.0) as i64;
         match kept.last_mut() {
             Some((last, best)) if *last == bin => {
                 if value[k] > value[*best] {
