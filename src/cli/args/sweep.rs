@@ -33,8 +33,7 @@ impl From<SweepOverrides> for Overrides {
   stylet sweep scenarios/sweeps/noise.ron --resume      after an interruption
   stylet replay out/noise 123                           one trial with a full report
 
-Writes report.html, trials.csv, summary.json, and sweep.ron and scenario.ron, which repeat the sweep. The
-same sweep and seed give the same bytes for any number of threads.
+Writes report.html, trials.csv, summary.json, and sweep.ron and scenario.ron, which repeat the sweep.
 
 On a cluster: `stylet sweep plan SWEEP --shards N`, then `run-shard I/N` anywhere, then `merge`.")]
 pub struct SweepArgs {

@@ -54,7 +54,11 @@ pub struct VelocityEstimate {
 pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
     let n = t.len().min(z.len());
     if n < 8 {
-        return VelocityEstimate { velocity_mps: vec![0.0; n], sd_mps: f64::INFINITY, ..VelocityEstimate::default() };
+        return VelocityEstimate {
+            velocity_mps: vec![0.0; n],
+            sd_mps: f64::INFINITY,
+            ..VelocityEstimate::default()
+        };
     }
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
     let step = median(&mut steps).max(1e-9);
