@@ -144,8 +144,7 @@ pub struct BenchmarkExportArgs {
 
 The program reads `start RATE_HZ` at the beginning of a stream and then one line `TIME_S,POSITION_M,FORCE_N`
 per sample; it replies to each sample with one line, `EVENT,DROP_N,CONFIDENCE,TIP_FORCE_N`, where fields may
-be empty. The next sample is sent after the reply, so the detector is causal. README.md of the streams has
-the details.
+be empty. README.md of the streams has the details.
 
 Writes events.csv, entrant.json (name, time per sample) and enhanced/NNNN.csv where a tip force was given.")]
 pub struct BenchmarkReplayArgs {
@@ -196,9 +195,9 @@ pub struct BenchmarkJudgeOnlineArgs {
   stylet benchmark plan --cases 60 --seed 7
   stylet benchmark plan --wrong thickness --severity medium --cases 30 --seed 7
 
-A case hides one strong effect (never force_gain, which no motion can show). Its first insertion has one
-constant speed and no retraction. Where the diagnosis then leaves the effect open, a second insertion into
-the same tissue follows: the planned one and, for comparison, the paper's sinusoid. Writes table.txt (rates
+A case hides one strong effect. Its first insertion has one constant speed and no retraction. Where the
+diagnosis then leaves the effect open, a second insertion into the same tissue follows: the planned one and,
+for comparison, the paper's sinusoid. Writes table.txt (rates
 with 95 % Wilson intervals), cases.json and cases.jsonl, from which an interrupted run resumes.")]
 pub struct BenchmarkPlanArgs {
     /// Tissue model of the independent simulator: plain or rich.

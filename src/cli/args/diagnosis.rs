@@ -66,10 +66,9 @@ impl DiagnoseArgs {
   stylet identify --data log1.csv log2.csv --out phantom.ron
   stylet identify --data log.csv --columns map.ron --layers 3
 
-Writes phantom.ron (layers with thickness, stiffness, friction and puncture force, and the effects found
-in the recordings), report.html and diagnosis.json; --out FILE.ron writes the phantom there and the rest
-into the default folder. At one constant speed stiffness and friction cannot be separated: record
-different motions.")]
+Writes phantom.ron (a scenario with the layers and effects found), report.html and diagnosis.json;
+--out FILE.ron writes the phantom there and the rest into the default folder. At one constant speed
+stiffness and friction cannot be separated: record different motions.")]
 pub struct IdentifyArgs {
     /// Recordings (CSV with header).
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]

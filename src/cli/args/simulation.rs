@@ -40,7 +40,7 @@ pub struct RunArgs {
   stylet compare --world rich --seeds 200
 
 Writes report.html and compare.json. With --world the insertions come from the independent simulator of
-`stylet benchmark diagnose`, with correct assumptions. Scenarios are replayed kinematically.")]
+`stylet benchmark diagnose`, with correct assumptions.")]
 pub struct CompareArgs {
     /// Scenario files (RON).
     #[arg(required_unless_present = "world")]
