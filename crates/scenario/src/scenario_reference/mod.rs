@@ -168,7 +168,7 @@ pub fn effects_page() -> String {
     let mut page = "# Effects reference\n\n\
         An effect is `coulomb_friction` in outputs and on the command line, `CoulombFriction` in the list `effects: [...]` of a scenario. Per effect: equation\n\
         ([symbols](model.md#symbols-and-signs)), a line to paste, parameters (*inactive*: the value without effect, *typical*: where a fit starts), the force of one insertion without and\n\
-        with the effect, how to recognise it, and a source. Pictures and lines may have another size than the typical one. This page is generated. [Custom effects](../how-to/custom_effects.md) are formulas of your own.\n\n"
+        with it, how to recognise it, and a source. Pictures and lines may have another size than the typical one. This page is generated. [Custom effects](../how-to/custom_effects.md) are formulas of your own.\n\n"
         .to_owned();
     let mut heading = "General effects";
     let _ = writeln!(page, "## {heading}\n");
@@ -201,7 +201,7 @@ pub fn effects_page() -> String {
         }
         let _ = writeln!(
             page,
-            "\n![Effect of {}](../figures/effects/{}.svg)\n\n{} Source: {}.\n",
+            "\n![{}](../figures/effects/{}.svg)\n\n{} Source: {}.\n",
             info.id,
             info.id,
             info.signature,
