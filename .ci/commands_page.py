@@ -12,12 +12,12 @@ PAGE = Path(__file__).resolve().parents[1] / "docs/reference/commands.md"
 
 HEAD = """# Commands
 
-Generated from `--help` by `python3 .ci/commands_page.py STYLET`. [Exit codes and common errors](errors.md).
+Written by `python3 .ci/commands_page.py STYLET` from `--help`. [Exit codes and errors](errors.md).
 
 """
 
-# Options that mean the same for every command that has them; described once.
-COMMON = ["--out", "--quiet", "--columns", "--repair", "--limit-memory", "--limit-time"]
+# Options of many commands, described once where a command describes them as `stylet check` does.
+COMMON = ["--data", "--columns", "--repair", "--effects", "--out", "--quiet", "--limit-memory", "--limit-time"]
 
 
 def help_of(binary, *words):
@@ -45,46 +45,47 @@ def commands(binary):
     return out
 
 
-def split_options(text):
-    """A help text without the common options, and these by name."""
-    kept, common, current = [], {}, None
+def options(text):
+    """The lines of each option of a help text, by name."""
+    found, current = {}, None
     for line in text.splitlines():
         option = re.match(r" {2,6}(?:-\w, )?(--[\w-]+)", line)
         if option:
-            current = option.group(1) if option.group(1) in [*COMMON, "--help"] else None
-            # A file in place of a folder, or no lines at all: of this command alone.
-            if "--out <FILE>" in line or "Print no" in line and "nothing but errors" not in line:
-                current = None
-            if current:
-                common[current] = []
+            current = found.setdefault(option.group(1), [])
         elif line and not line.startswith(" " * 8):
             current = None
-        if current:
-            common[current].append(line.strip())
-        else:
-            kept.append(line.rstrip())
-    common.pop("--help", None)
-    text = re.sub(r"([^\n])\n(Examples?:)", r"\1\n\n\2", "\n".join(kept))
-    return re.sub(r"\n{3,}", "\n\n", text), common
+        if current is not None:
+            current.append(line)
+    return found
 
 
-def one_line(words):
+def one_line(lines):
     """`--flag <VALUE>` and its meaning, from the lines of an option."""
-    name, _, meaning = re.sub(r"^-\w, ", "", words[0]).partition("  ")
-    return name, " ".join(" ".join([meaning, *words[1:]]).split())
+    name, _, meaning = re.sub(r"^-\w, ", "", lines[0].strip()).partition("  ")
+    return name, " ".join(" ".join([meaning, *lines[1:]]).split())
+
+
+def split_options(text, common):
+    """A help text without the options that are in `common` with the same meaning, and their names."""
+    every = options(text)
+    left_out = [name for name in common if name in every and one_line(every[name])[1] == common[name][1]]
+    for name in [*left_out, "--help"]:
+        text = text.replace("\n".join(every.get(name, [])) + "\n", "", 1)
+    text = re.sub(r"([^\n])\n(Examples?:)", r"\1\n\n\2", text)
+    return re.sub(r"\n{3,}", "\n\n", text), left_out
 
 
 def page(binary):
     every = commands(binary)
-    run = {**split_options(every["diagnose"])[1]}
+    described = options(every["check"])
+    common = {name: one_line(described[name]) for name in COMMON}
     text = HEAD + "## Common options\n\n| option | meaning |\n|---|---|\n"
-    for name in COMMON:
-        option, meaning = one_line(run[name])
+    for option, meaning in common.values():
         text += f"| `{option}` | {meaning.replace('|', chr(92) + '|').replace('<', '&lt;')} |\n"
     text += "\n"
     for name, usage in every.items():
         first, _, rest = usage.partition("\nUsage:")
-        rest, common = split_options(f"Usage:{rest}".strip())
+        rest, left_out = split_options(f"Usage:{rest}".strip() + "\n", common)
         rest = re.sub(r"\nOptions:\n(?=\n|$)", "", rest).strip()
         # Paragraphs behind the examples are prose.
         head, mark, tail = rest.partition("\nExample")
@@ -94,8 +95,8 @@ def page(binary):
         summary = " ".join(first.split())
         text += f"{'###' if ' ' in name else '##'} {name}\n\n{summary}{'' if summary.endswith(('?', '.')) else '.'}\n\n```text\n{rest}\n```\n\n"
         text += "".join(p.replace("<", "&lt;") + "\n\n" for p in prose)
-        if common:
-            text += "[Common options](#common-options): " + ", ".join(f"`{c}`" for c in COMMON if c in common) + ".\n\n"
+        if left_out:
+            text += "Common options: " + ", ".join(f"`{c}`" for c in left_out) + ".\n\n"
     return text.rstrip() + "\n"
 
 

@@ -3,16 +3,19 @@
 
 1. The book builds without warnings, where mdbook is installed.
 2. Every page is in SUMMARY.md; every relative link and anchor leads somewhere; every `docs/...` path in the sources exists.
-3. docs/reference/commands.md is what --help says; every flag named in README and book exists; every command is named in the README or the book; every
-   message in docs/reference/errors.md stands in the sources.
-4. Every ```sh block of the tutorials runs, in order, in a temporary folder per page, and prints the ```text block behind it.
+3. docs/reference/commands.md is what --help says; every command and flag in README and book exists; every command is named in the README or the book; the
+   files that --help says a command writes are those in the table of docs/reference/files.md; every message in docs/reference/errors.md is in the sources.
+4. Every ```sh block of the tutorials runs, in order, in a temporary folder per page, and prints the ```text block behind it. Its commands write the files of
+   the table, and no others.
 5. No misspelt word, where typos is installed.
+6. The book has at most 45 pages and 25 000 words: words of prose, lists and tables, without code blocks (fenced or indented), HTML and comments.
 
 In a page, `<!-- file: NAME -->` in front of a code block saves it under that name; `<!-- file: NAME of PATH -->` also checks that it is this file; `<!-- not run: reason -->` in front of an ```sh block skips it, `<!-- exit code 2 -->` expects
 that exit code.
 In an expected output a line `...` stands for any lines, and `...` inside a line for any text. Python blocks of the tutorials run where `import stylet` works in $PYTHON (python3).
 """
 
+import json
 import os
 import re
 import shutil
@@ -163,7 +166,40 @@ def check_messages():
                 fault(f"docs/reference/errors.md: no source has the message {message!r}")
 
 
+def documented_outputs():
+    """From docs/reference/files.md: (commands, files that each of them writes, files that it writes in some cases)."""
+    rows = re.findall(r"^\| (`[a-z][^|]*) \| (.*) \|(.*)\|$", (DOCS / "reference/files.md").read_text().split("| command | files besides")[1].split("\n\n")[0], re.M)
+
+    def names(cell):
+        return {f for f in re.findall(r"`([^`]+)`", cell) if re.search(r"\.\w+$", f)}
+    return [(re.findall(r"`([^`]+)`", commands), names(always), names(sometimes)) for commands, always, sometimes in rows]
+
+
+def check_outputs_in_help(binary):
+    table = {command: always | sometimes | {"report.html"} for commands, always, sometimes in documented_outputs() for command in commands}
+    for name, text in commands_page.commands(binary).items():
+        for sentence in re.findall(r"^Writes (.*?)(?:\.\s|\.?\Z)", text, re.M | re.S):
+            for file in re.findall(r"(?<![\w/.])[a-zA-Z][\w-]*\.(?:json|jsonl|csv|ron|svg|html|txt|md)\b", sentence):
+                if file[0].islower() and not any(Path(f).name == file for f in table.get(name, ())):
+                    fault(f"`stylet {name} --help` says that it writes {file}, docs/reference/files.md does not")
+
+
 # 4
+
+def check_outputs(page, work, code):
+    """The folders that the commands of a page wrote have the documented files."""
+    table = documented_outputs()
+    folders = [{str(f.relative_to(folder)) for f in folder.rglob("*")} for folder in [work, *(d for d in work.rglob("*") if d.is_dir() and not d.is_symlink())]]
+    for manifest in work.rglob("manifest.json"):
+        files = set(json.loads(manifest.read_text())["sha256"]) - {"report.html"}
+        if not any(always <= files <= always | sometimes for _, always, sometimes in table):
+            fault(f"{page}: docs/reference/files.md has no command that writes {sorted(files)}")
+    for commands, always, _ in table:
+        for command in commands:
+            written = {f for f in always if "NNNN" not in f}
+            if re.search(rf"\bstylet {command} (?!.*--online)", code) and not any(written <= files for files in folders):
+                fault(f"{page}: `stylet {command}` does not write all of {sorted(written)}")
+
 
 def matches(wanted, printed):
     """Whether the expected lines stand in the output in order."""
@@ -199,7 +235,7 @@ def run_tutorials(binary):
             for name in ("scenarios", "crates"):
                 (work / name).symlink_to(ROOT / name)
             env = {**os.environ, "PATH": f"{work}/bin:{os.environ['PATH']}", "NO_COLOR": "1", "COLUMNS": "120"}
-            printed, python_code = None, ""
+            printed, python_code, shell_code = None, "", ""
             for marker, lang, code in blocks(page.read_text()):
                 if marker.startswith("file: "):
                     (work / marker[6:].split()[0]).write_text(code)
@@ -228,12 +264,14 @@ def run_tutorials(binary):
                     command = [python, "-c", python_code]
                 else:
                     command = ["bash", "-euo", "pipefail", "-c", code]
+                    shell_code += code
                 done = subprocess.run(command, cwd=work, env=env, capture_output=True, text=True)
                 printed = done.stdout.rsplit("\x00", 1)[-1] + done.stderr
                 ran += 1
                 wanted = int(marker[10:]) if marker.startswith("exit code ") else 0
                 if done.returncode != wanted:
                     fault(f"{page.name}: exit code {done.returncode}: {code}\n{printed}")
+            check_outputs(page.name, work, shell_code)
         print(f"docs: {page.name}: {time.monotonic() - start:.1f} s")
     print(f"docs: {ran} blocks ran")
     if ran < 15:
@@ -253,14 +291,20 @@ def check_spelling():
         print("docs: spelling checked")
 
 
-def count_words():
-    generated = {"commands.md", "scenario.md", "effects.md", "constants.md"}
+# 6
 
-    def words(path):
-        return sum(any(c.isalnum() for c in w) for w in without_code(path.read_text()).split())
+def words(text):
+    text = re.sub(r"(?<=\n\n)(?: {4}.*\n+)+", "\n", without_code(text))
+    text = re.sub(r"<!--.*?-->|</?[a-zA-Z][^>\n]*>", "", text, flags=re.S)
+    return sum(any(c.isalnum() for c in word) for word in text.split())
+
+
+def count_words():
     book = [p for p in pages() if p.name != "SUMMARY.md"]
-    lists = sum(words(p) for p in book if p.name in generated)
-    print(f"docs: {len(book)} pages, {sum(map(words, book)) - lists} words outside code, and {lists} in lists of the sources ({', '.join(sorted(generated))})")
+    total = sum(words(p.read_text()) for p in book)
+    print(f"docs: {len(book)} pages, {total} words")
+    if len(book) > 45 or total > 25_000:
+        fault("the book has more than 45 pages or 25 000 words")
     size = sum(p.stat().st_size for p in DOCS.rglob("*") if p.is_file())
     if size > 4_000_000:
         fault(f"docs/ has {size} bytes, more than 4 MB")
@@ -274,6 +318,7 @@ if __name__ == "__main__":
     build_book()
     check_links()
     check_commands(binary)
+    check_outputs_in_help(binary)
     check_messages()
     check_spelling()
     run_tutorials(binary)

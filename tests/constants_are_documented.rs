@@ -1,4 +1,4 @@
-//! Every constant of `identify` and `diagnose` is listed in `docs/reference/constants.md` with value, unit, kind and reason; changes must be made
+//! Every constant of `identify` and `diagnose` is listed in `crates/diagnose/CONSTANTS.md` with value, unit, kind and reason; changes must be made
 //! there too.
 
 use std::collections::BTreeMap;
@@ -86,8 +86,8 @@ fn rows(page: &str) -> Vec<Vec<String>> {
 #[test]
 fn every_constant_of_the_diagnosis_stands_in_the_table_with_its_value_and_reason() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let page = std::fs::read_to_string(root.join("docs/reference/constants.md"))
-        .expect("docs/reference/constants.md");
+    let page = std::fs::read_to_string(root.join("crates/diagnose/CONSTANTS.md"))
+        .expect("crates/diagnose/CONSTANTS.md");
     let (mut documented, mut faults) = (Constants::new(), Vec::new());
     let mut kinds: BTreeMap<String, usize> = BTreeMap::new();
     let (mut choices, mut of_sets) = (0, 0);
@@ -141,7 +141,7 @@ fn every_constant_of_the_diagnosis_stands_in_the_table_with_its_value_and_reason
             faults.push(format!("the page has to say `| {kind} | {count} |`"));
         }
     }
-    assert!(faults.is_empty(), "docs/reference/constants.md:\n{}", faults.join("\n"));
+    assert!(faults.is_empty(), "crates/diagnose/CONSTANTS.md:\n{}", faults.join("\n"));
 }
 
 #[test]

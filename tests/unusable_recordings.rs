@@ -64,7 +64,7 @@ fn one_unusable_recording_is_reported_with_the_same_message_by_every_command() {
     let with =
         |change: &dyn Fn(usize, Row) -> Row| csv(rows.iter().enumerate().map(|(i, row)| change(i, *row)));
     let cases: [(&str, String, &[&str]); 6] = [
-        ("dead.csv", with(&|_, [t, z, _]| [t, z, 0.0]), &["the force stands at 0 N", "check the cable"]),
+        ("dead.csv", with(&|_, [t, z, _]| [t, z, 0.0]), &["the force is 0 N", "check the cable"]),
         ("reversed.csv", with(&|_, [t, z, f]| [t, z, -f]), &["the force has the wrong sign", "scale: -1"]),
         (
             "millimetres.csv",

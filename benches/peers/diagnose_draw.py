@@ -1,4 +1,4 @@
-"""Draws the table of `diagnose.sh`: cases answered rightly and alone, and cases with a wrong name, with 95 % Wilson intervals.
+"""Draws the table of `diagnose.sh`: correct answers, and false attributions, with 95 % Wilson intervals.
 
     python diagnose_draw.py TABLE.txt PICTURE.svg
 """
@@ -38,7 +38,7 @@ def main(table, picture):
     table = read(table)
     figure, axes = plt.subplots(len(table), 2, figsize=(12, 3.1 * len(table)), sharey=True, squeeze=False)
     for row, (world, programs) in zip(axes, table.items()):
-        for axis, first, what in zip(row, (0, 3), ("right, and nothing else named", "a wrong name")):
+        for axis, first, what in zip(row, (0, 3), ("correct, and nothing else named", "false attribution")):
             for k, (program, name) in enumerate(NAMES.items()):
                 rates = [programs[program][hidden] for hidden in HIDDEN]
                 at = [g + 0.16 * (k - 2) for g in range(len(HIDDEN))]

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Light {
-    /// Nothing stands against a diagnosis.
+    /// Good enough for a diagnosis.
     Good,
     /// A diagnosis will be limited.
     Limited,

@@ -124,28 +124,28 @@ fn readme(cases: usize) -> String {
     format!(
         "# What does the simulation get wrong?
 
-{cases} cases. Each folder `cases/NNNN` holds what a simulation believes (`assumed.ron`) and what was measured: `1.csv`, `2.csv` ...
+{cases} cases. Each folder `cases/NNNN` holds the assumed scenario (`assumed.ron`) and recordings: `1.csv`, `2.csv` ...
 with the columns `time_s,position_m,force_n` (SI units; position positive into the tissue, force positive when it resists).
 
 The assumed law: in the active layer an elastic force `K (z - front)`; the layer ruptures when that force reaches `puncture_n` (if
 given) or the tip its far face, and the elastic force is gone at once; viscous friction `v sum(b_i l_i)` along the needle inside,
 `l_i` the length inside layer `i`. Fronts follow from `surface_m` and the thicknesses.
 
-What nobody knows exactly is not wrong: `K`, `b`, `F` within 30 %, thicknesses within 10 %, the surface within 2 mm; noise of any
-colour, growing with the force, with tails; scatter between recordings.
+These deviations are normal and are no answer: `K`, `b`, `F` within 30 %, thicknesses within 10 %, the surface within 2 mm;
+coloured noise, noise that grows with the force, outliers; scatter between recordings.
 
-Say for every case what is wrong beyond that, with the names in `names.txt`. One file `answers.json`:
+Name for every case what is wrong beyond that, with the names in `names.txt`. One file `answers.json`:
 
     {{ \"0001\": {{ \"verdict\": \"none\" }},
       \"0002\": {{ \"verdict\": \"named\", \"causes\": [ {{ \"effect\": \"coulomb_friction\", \"equivalent\": [], \"confidence\": 0.9,
                 \"parameters\": {{ \"c_n_per_m\": {{ \"value\": 4.1, \"low\": 3.9, \"high\": 4.3 }} }} }} ] }},
       \"0003\": {{ \"verdict\": \"unknown\" }} }}
 
-`none`: the simulation agrees with the data. `named`: one or more causes. `ambiguous`: causes, one of which stands for a class (its
-other members under `equivalent`, at most four names in all). `unknown`: structure that none of the names describes. Everything but
+`none`: the simulation agrees with the data. `named`: one or more causes. `ambiguous`: several effects explain the data
+equally well (one as `effect`, the others under `equivalent`, at most four names in all). `unknown`: structure that none of the names describes. Everything but
 `verdict` and `effect` may be left out; a case without an answer counts as wrong.
 
-Judged with `stylet benchmark score FOLDER answers.json` by whoever has the key.
+With the key, `stylet benchmark score FOLDER answers.json` scores the answers.
 "
     )
 }

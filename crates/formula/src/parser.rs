@@ -200,9 +200,10 @@ impl Parser<'_> {
                 self.next += 1;
                 Ok(end)
             }
-            Some(token) if token.kind == TokenKind::Symbol(b',') => {
-                Err(FormulaError::new(token.place, "a comma stands only between the arguments of a function"))
-            }
+            Some(token) if token.kind == TokenKind::Symbol(b',') => Err(FormulaError::new(
+                token.place,
+                "a comma is allowed only between the arguments of a function",
+            )),
             Some(token) => Err(FormulaError::new(
                 token.place,
                 "an operator is missing before this, for example `*`, or the bracket before it was not closed",

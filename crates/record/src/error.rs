@@ -55,7 +55,7 @@ pub enum RecordError {
 
     /// Numbers without column names.
     #[error(
-        "{}: line {line}: the header is missing: no line of names stands above the {columns} columns of numbers; give the columns by \
+        "{}: line {line}: the header is missing: there is no line of names above the {columns} columns of numbers; give the columns by \
          number in a column map, such as time: (column: 1), or begin the file with a line of names such as time_s,position_m,force_n",
         path.display()
     )]

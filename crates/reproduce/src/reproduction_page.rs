@@ -60,7 +60,7 @@ fn summary(claims: &[Claim], study: &Study) -> Section {
             "The primary condition is the paper's own protocol and decides alone: from it one effect with its 95 % interval over the noise seeds {first} to {last}. \
              Supported: the whole interval on the claim's side of the bar; contradicted: on the other side; undecided: neither. Assumed: a number that we chose \
              decides, because the effect changes sides when it is halved or doubled. Untestable: no simulation can say. Sensitivity conditions say how far a \
-             claim carries and change no verdict. Protocols and bars were written down before the numbers were computed; what was changed afterwards, and why, stands at the end of claims/README.md. S: supplement, M: main paper."
+             claim carries and change no verdict. Protocols and bars were written down before the numbers were computed; claims/README.md lists at its end what was changed afterwards, and why. S: supplement, M: main paper."
         ))
         .text(
             "The intervals hold the noise of the simulated sensor and nothing else: not the scatter of real gels, not the error of the law. A narrow one says that \
@@ -223,8 +223,8 @@ pub fn page(
         Section::new("What this is")
             .text(
                 "Our analogues of the supplement's Figs 1 to 15 and, as far as the supplement describes them, of the main paper's Table I and Figs 12, 13, 14. \
-                 The phantoms are simulated, the algorithm is our own implementation of the paper's. Behind every table stands in brackets whose its numbers \
-                 are: the paper's (printed in the supplement), the laboratory's (published with its software, facts only), literature (measured by others), \
+                 The phantoms are simulated, the algorithm is our own implementation of the paper's. The brackets behind every table name the origin of its numbers: \
+                 the paper's (printed in the supplement), the laboratory's (published with its software, facts only), literature (measured by others), \
                  ours (chosen), computed (printed by this program from runs). Curves and dots in the figures are computed; the numbers that went \
                  into them stand under each with their class. In running text the paper's numbers follow `The paper says`, ours `Assumed`. The figures were compared with the supplement's text and captions, which is what \
                  was at hand: curves and axes of the printed figures could not be measured.",

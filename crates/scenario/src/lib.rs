@@ -45,7 +45,7 @@ pub use robot_config::{ArmConfig, ArmController, Robot};
 pub use ron_dialect::ron_options;
 pub use scenario::Scenario;
 pub use scenario_field::{ScenarioField, set_fields};
-pub use scenario_reference::{effect_line, effects_page, effects_table, scenario_page};
+pub use scenario_reference::{custom_variables, effect_line, effects_by_stage, effects_page, scenario_page};
 pub use sensor_config::{ForceTorque, Sensor, VirtualSensor, WrenchEstimate, ZeroWindow};
 pub use sweep_file::{RandomEffect, Sampling, SweepFile, VariedField};
 pub use unused_settings::unused_settings;

@@ -122,7 +122,7 @@ impl ErrorLocation<'_> {
                 if found.starts_with(|c: char| c.is_ascii_digit()) =>
             {
                 here(format!(
-                    "`{found}` stands where a field name is expected; decimals are written with a point, `0.{found}`"
+                    "a field name is expected, not `{found}`; decimals are written with a point, `0.{found}`"
                 ))
             }
             Error::ExpectedMapColon => {
@@ -188,7 +188,7 @@ impl ErrorLocation<'_> {
                         "`{name}` needs brackets behind it, also empty ones for its defaults: `{name}(...)`"
                     )
                 } else {
-                    format!("`{name}` stands where brackets with fields are expected: `(field: value, ...)`")
+                    format!("brackets with fields are expected, not `{name}`: `(field: value, ...)`")
                 };
                 (token.start, token.end, what)
             }

@@ -88,11 +88,10 @@ impl CaseArgs {
   stylet benchmark diagnose --wrong all --severity large --effect time_delay --cases 60
   stylet benchmark diagnose --world rich --hide one --cases 60
 
-An unknown word for --wrong or --hide is answered by the list of words.
+The error about an unknown word of --wrong or --hide lists all words.
 
-Writes report.html with the map of where the diagnosis fails, the same as SVG, table.txt (rates with 95 %
-Wilson intervals), table.json and cases.jsonl, one line per case. Cases in it are not run again, so an
-interrupted run resumes where it stopped.")]
+Writes report.html, the map of where the diagnosis fails (SVG), table.txt (rates with 95 % Wilson
+intervals), table.json and cases.jsonl, one line per case. An interrupted run resumes from cases.jsonl.")]
 pub struct BenchmarkDiagnoseArgs {
     #[command(flatten)]
     pub cases: CaseArgs,
@@ -115,18 +114,18 @@ pub struct BenchmarkDiagnoseArgs {
   stylet benchmark export --online --rows hand_held,hold --split make --cases 30 --out out/make
 
 Writes README.md (the task), names.txt (admissible names) and cases/NNNN with assumed.ron and the
-recordings as CSV. The key with the hidden effects goes to DIR.key.json next to the folder; keep it, and
-choose a seed that nobody would guess.
+recordings as CSV. The hidden effects are in DIR.key.json next to the folder. Keep this key and the seed
+secret: the seed reproduces the cases.
 
 With --online: streams/NNNN.csv for online detection of punctures, their rates in streams.csv, and the key;
-for `--split make` also truth.csv. Streams of the two splits and of different seeds have nothing in common.")]
+for `--split make` also truth.csv. Different splits and seeds give independent streams.")]
 pub struct BenchmarkExportArgs {
     #[command(flatten)]
     pub cases: CaseArgs,
     /// Export streams for online detection of punctures instead of cases for the diagnosis.
     #[arg(long, conflicts_with_all = ["misspecification", "severity", "hide", "size", "effect"])]
     pub online: bool,
-    /// With --online: rows of the table, `all` for every one; an unknown word is answered by the list.
+    /// With --online: rows of the table, `all` for every one; the error about an unknown word lists them.
     #[arg(long, value_name = "WORDS", value_delimiter = ',', default_value = "all", requires = "online")]
     pub rows: Vec<String>,
     /// With --online: `make` for choosing a detector's settings, `judge` for judging it.
@@ -143,9 +142,9 @@ pub struct BenchmarkExportArgs {
   stylet benchmark replay out/streams --out out/answers/mine -- python3 mine.py --window 0.1
   stylet benchmark replay out/streams --out out/answers/stylet --algorithm Stylet
 
-The program is given `start RATE_HZ` at the beginning of a stream and then one line `TIME_S,POSITION_M,FORCE_N`
-per sample; it replies one line to each sample, `EVENT,DROP_N,CONFIDENCE,TIP_FORCE_N`, where fields may be
-empty or left out. So only causal detectors can play. The README.md of the streams has the details.
+The program reads `start RATE_HZ` at the beginning of a stream and then one line `TIME_S,POSITION_M,FORCE_N`
+per sample; it replies to each sample with one line, `EVENT,DROP_N,CONFIDENCE,TIP_FORCE_N`, where fields may
+be empty. README.md of the streams has the details.
 
 Writes events.csv, entrant.json (name, time per sample) and enhanced/NNNN.csv where a tip force was given.")]
 pub struct BenchmarkReplayArgs {
@@ -158,7 +157,7 @@ pub struct BenchmarkReplayArgs {
     /// Name in the table [default: name of the answers' folder].
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
-    /// Play this algorithm of Stylet instead of a program.
+    /// Run this algorithm of Stylet instead of a program.
     #[arg(long, value_name = "NAME", conflicts_with = "program", required_unless_present = "program")]
     pub algorithm: Option<AlgorithmArg>,
     /// Streams replayed in parallel, each to a process of its own [default: number of cores].
@@ -196,11 +195,10 @@ pub struct BenchmarkJudgeOnlineArgs {
   stylet benchmark plan --cases 60 --seed 7
   stylet benchmark plan --wrong thickness --severity medium --cases 30 --seed 7
 
-A case hides one strong effect (never force_gain, which no motion can show). Its first insertion has one
-constant speed and no retraction; a case is open when the diagnosis then has the effect in a class of
-equivalent causes or lists it as not identifiable. Open cases get a second insertion of the same tissue: the
-planned one and, for comparison, the paper's sinusoid. Writes table.txt (rates with 95 % Wilson intervals),
-cases.json and cases.jsonl; cases in it are not run again.")]
+A case hides one strong effect. Its first insertion has one constant speed and no retraction. Where the
+diagnosis then leaves the effect open, a second insertion into the same tissue follows: the planned one and,
+for comparison, the paper's sinusoid. Writes table.txt (rates
+with 95 % Wilson intervals), cases.json and cases.jsonl, from which an interrupted run resumes.")]
 pub struct BenchmarkPlanArgs {
     /// Tissue model of the independent simulator: plain or rich.
     #[arg(long, value_name = "WORLD", default_value = "plain")]

@@ -16,9 +16,8 @@ use stylet_api::DiagnosisInputs;
   stylet diagnose --data log1.csv log2.csv
 
 Writes report.html, diagnosis.json and extended.ron: the scenario with re-fitted parameters and the
-effects found, ready for `stylet run` (give it a motion if the scenario says `Recorded`). The exit code
-is 0 whatever the verdict, 1 when `stylet check` says that a diagnosis would mean nothing, 2 when an
-input is wrong.")]
+effects found, for `stylet run` (with --motion if the scenario says `Recorded`). The exit code is 0 whatever
+the verdict, 1 when `stylet check` calls the recordings unusable, 2 when an input is wrong.")]
 pub struct DiagnoseArgs {
     /// Assumed scenario, or a data set of repeated insertions (RON). Without one the layers are those that
     /// the recordings show, as `stylet identify` finds them.
@@ -27,19 +26,19 @@ pub struct DiagnoseArgs {
     /// what the model lacks, and predict each recording by the others. A data set implies it.
     #[arg(long)]
     pub repeats: bool,
-    /// Recordings (CSV with header); different motions identify more than one. A data set names its own.
+    /// Recordings (CSV with header). A data set names its own.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub data: Vec<PathBuf>,
-    /// Custom effects that are candidates, too: lists of `Custom(...)` (RON).
+    /// Custom effects as further candidates: lists of `Custom(...)` (RON).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub effects: Vec<PathBuf>,
-    /// Column map: names and units of the logs' columns (RON).
+    /// Column map: names and units of the recordings' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
     /// Drop rows with backward or repeated time stamps, and report which.
     #[arg(long)]
     pub repair: bool,
-    /// Diagnose although `stylet check` says that the result would mean nothing.
+    /// Diagnose recordings that `stylet check` calls unusable.
     #[arg(long)]
     pub force: bool,
     #[command(flatten)]
@@ -67,10 +66,9 @@ impl DiagnoseArgs {
   stylet identify --data log1.csv log2.csv --out phantom.ron
   stylet identify --data log.csv --columns map.ron --layers 3
 
-Writes phantom.ron (layers with thickness, stiffness, friction and puncture force, and the effects found
-in the recordings), report.html and diagnosis.json into a folder; --out FILE.ron writes the phantom there
-and the rest into the default folder. Recordings with different motions determine more than
-repeats of one: at one constant speed stiffness and friction cannot be separated.")]
+Writes phantom.ron (a scenario with the layers and effects found), report.html and diagnosis.json;
+--out FILE.ron writes the phantom there and the rest into the default folder. At one constant speed
+stiffness and friction cannot be separated: record different motions.")]
 pub struct IdentifyArgs {
     /// Recordings (CSV with header).
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
@@ -78,7 +76,7 @@ pub struct IdentifyArgs {
     /// Number of layers [default: as many as the recordings show].
     #[arg(long, value_name = "N")]
     pub layers: Option<usize>,
-    /// Column map: names and units of the logs' columns (RON).
+    /// Column map: names and units of the recordings' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
     /// Drop rows with backward or repeated time stamps, and report which.
@@ -98,11 +96,9 @@ pub struct IdentifyArgs {
   stylet predict out/diagnosis/extended.ron --data e.csv --refit-on d.csv --same tissue
   stylet predict phantom.ron --data a.csv --out out/phantom
 
-Writes report.html and predict.json: the RMS error per recording, the sensor noise, the share of samples
-inside the 90 % band, and the errors of mean curves without a model. Noise, scatter, intervals, misfit and
-the formerly assumed scenario are taken from diagnosis.json and inputs.json in the model's folder.
-Recordings that did not make the model are taken for another group: another needle, other tissue, another
-set-up; --same narrows the band. The exit code is 0 however large the error is.")]
+Writes report.html and predict.json. Noise, scatter, intervals, misfit and the formerly assumed scenario
+are taken from diagnosis.json and inputs.json in the model's folder. The band allows for another needle,
+tissue and set-up; --same narrows it. The exit code is 0 however large the error is.")]
 pub struct PredictArgs {
     /// Model: extended.ron of a diagnosis, or any scenario (RON).
     pub model: PathBuf,
@@ -123,10 +119,10 @@ pub struct PredictArgs {
     /// What is the same as when the model was made.
     #[arg(long, value_name = "FACTORS", value_delimiter = ',')]
     pub same: Vec<SameArg>,
-    /// Column map: names and units of the logs' columns (RON).
+    /// Column map: names and units of the recordings' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
-    /// Drop rows with backward or repeated time stamps.
+    /// Drop rows with backward or repeated time stamps, and report which.
     #[arg(long)]
     pub repair: bool,
     #[command(flatten)]
@@ -167,21 +163,20 @@ pub enum SameArg {
   stylet check assumed.ron --data a.csv b.csv
   stylet check assumed.ron --data log.csv --columns map.ron --out out/check
 
-Writes report.html and check.json. Each aspect is good, limited or unusable, with the reason. The exit code is 1 when
-a diagnosis would mean nothing.")]
+Writes report.html and check.json. The exit code is 1 when an aspect is unusable.")]
 pub struct CheckArgs {
     /// Assumed scenario (RON).
     pub assumed: PathBuf,
     /// Recordings (CSV with header).
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
     pub data: Vec<PathBuf>,
-    /// Custom effects that are candidates, too: lists of `Custom(...)` (RON).
+    /// Custom effects as further candidates: lists of `Custom(...)` (RON).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub effects: Vec<PathBuf>,
-    /// Column map: names and units of the logs' columns (RON).
+    /// Column map: names and units of the recordings' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
-    /// Drop rows with backward or repeated time stamps.
+    /// Drop rows with backward or repeated time stamps, and report which.
     #[arg(long)]
     pub repair: bool,
     #[command(flatten)]
@@ -195,8 +190,7 @@ pub struct CheckArgs {
 #[command(after_help = "Examples:
   stylet compare-models out/monday out/tuesday
 
-Compares causes, and the parameters that both diagnoses determine with both covariances. Writes report.html and
-consistency.json.")]
+Writes report.html and consistency.json.")]
 pub struct CompareModelsArgs {
     /// Folder of a diagnosis, or its diagnosis.json.
     pub first: PathBuf,
@@ -223,13 +217,13 @@ pub struct IdentifiabilityArgs {
     /// Use motion and noise of these recordings (CSV with header) instead of a motion.
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub data: Vec<PathBuf>,
-    /// Custom effects that are candidates, too: lists of `Custom(...)` (RON).
+    /// Custom effects as further candidates: lists of `Custom(...)` (RON).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub effects: Vec<PathBuf>,
-    /// Column map: names and units of the logs' columns (RON).
+    /// Column map: names and units of the recordings' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
-    /// Drop rows with backward or repeated time stamps.
+    /// Drop rows with backward or repeated time stamps, and report which.
     #[arg(long)]
     pub repair: bool,
     #[command(flatten)]
@@ -247,9 +241,9 @@ pub struct IdentifiabilityArgs {
 
 limits.ron: Limits(depth_m: 0.09, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0)
 
-Writes plan.ron, plan.json and plan.html. plan.ron is a motion: `stylet run scenario.ron --motion plan.ron`
-simulates it; after the experiment give `stylet diagnose` the old and the new recordings together. Without
-recordings the scenario's own motion counts as done. The exit code is 2 when no motion keeps the limits.")]
+Writes plan.ron, plan.json and plan.html. `stylet run scenario.ron --motion plan.ron` simulates the motion;
+after the experiment diagnose old and new recordings together. Without recordings the scenario's own motion
+counts as done. The exit code is 2 when no motion keeps the limits.")]
 pub struct PlanArgs {
     /// Folder of a diagnosis, or a scenario (RON).
     pub from: PathBuf,
@@ -262,13 +256,13 @@ pub struct PlanArgs {
     /// With a scenario: recordings made so far (CSV with header).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub data: Vec<PathBuf>,
-    /// Custom effects that are candidates, too: lists of `Custom(...)` (RON).
+    /// Custom effects as further candidates: lists of `Custom(...)` (RON).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub effects: Vec<PathBuf>,
-    /// Column map: names and units of the logs' columns (RON).
+    /// Column map: names and units of the recordings' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
-    /// Drop rows with backward or repeated time stamps.
+    /// Drop rows with backward or repeated time stamps, and report which.
     #[arg(long)]
     pub repair: bool,
     /// Skip the simulated check of the planned insertion: seconds instead of minutes.

@@ -13,9 +13,8 @@ use std::path::PathBuf;
 
 It reads what every other command reads: text tables in any common encoding and notation, MATLAB before
 v7.3, and with the feature `formats` spreadsheets, MATLAB v7.3, HDF5, Parquet, MCAP and ROS 2 bags. Units
-come from names, a row of units or types; where there are none, the magnitude suggests some, which you
-check in the map:
-  stylet enhance machine.csv --columns map.ron")]
+come from names, a row of units or types. Where there are none, the map has a guess from the magnitude:
+check it.")]
 pub struct InspectArgs {
     /// Files of any supported format.
     #[arg(required = true)]

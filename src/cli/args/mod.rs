@@ -49,7 +49,7 @@ pub enum Command {
     Run(RunArgs),
     /// Run the online algorithm on a measured recording.
     Enhance(EnhanceArgs),
-    /// Look at a recording of any format: layout, columns, units, sampling, what stands in the way; propose a column map.
+    /// Look at a recording of any format: layout, columns, units, sampling, problems; propose a column map.
     Inspect(InspectArgs),
     /// Convert a recording to CSV, Parquet or MCAP.
     Convert(ConvertArgs),

@@ -20,9 +20,8 @@ A configuration: Enhance(cusum: (sigma_rupture_n: 0.1), model: MultiLayer).
 Of a scenario file the `enhance` part and the surface are used.
 
 With --model the friction along the shaft comes from a model that `stylet diagnose` fitted to other
-insertions. It is evaluated sample by sample along the recorded positions, each layer punctured as soon
-as its rupture is detected, and corrected during retraction by the measured force. Model and recording
-must have the same position origin.")]
+insertions, and is corrected during retraction by the measured force. Model and recording must have the
+same position origin.")]
 pub struct EnhanceArgs {
     /// Recording (CSV with header).
     pub data: PathBuf,
@@ -32,7 +31,7 @@ pub struct EnhanceArgs {
     /// Take the shaft friction from this model: extended.ron of a diagnosis, or any scenario (RON).
     #[arg(long, value_name = "EXTENDED.RON")]
     pub model: Option<PathBuf>,
-    /// Column map: names and units of a log's columns (RON).
+    /// Column map: names and units of the recordings' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
     /// Drop rows with backward or repeated time stamps, and report which.
@@ -82,15 +81,13 @@ impl ContactArg {
 
 A column map for a robot's log with force and position on separate topics:
   Columns(time: (name: \"/ft_sensor/wrench.log_time\"), force: (name: \"/ft_sensor/wrench.wrench.force.z\"),
-          position: (name: \"/tip.pose.position.z\"))
-
-Every command reads CSV, and with the feature `formats` also MCAP (JSON, ROS 2 messages), MATLAB v7.3 and Parquet.")]
+          position: (name: \"/tip.pose.position.z\"))")]
 pub struct ConvertArgs {
     /// Recording to read.
     pub from: PathBuf,
     /// File to write; the ending .csv, .parquet or .mcap selects the format.
     pub to: PathBuf,
-    /// Column map: names and units of a log's columns (RON).
+    /// Column map: names and units of the recordings' columns (RON).
     #[arg(long, value_name = "FILE")]
     pub columns: Option<PathBuf>,
     /// Drop rows with backward or repeated time stamps, and report which.
@@ -109,10 +106,8 @@ pub struct ConvertArgs {
 
 A sample is a line `time_s,position_m,force_n[,velocity_mps]` or a JSON object with these names; a datagram
 may hold several. Results go as JSON lines to standard output and to --forward (PlotJuggler: UDP server,
-message protocol JSON); each says whether its sample was used and why not. A wrong time stamp is ignored, a
-new clock restarts the algorithm. A slow reader loses its own oldest lines and never delays the algorithm;
-every line and the summary on standard error give the number lost. The datagram `end`, Ctrl-C or SIGTERM end
-the session.")]
+message protocol JSON). A slow reader loses its own oldest lines and never delays the algorithm. The datagram
+`end`, Ctrl-C or SIGTERM end the session.")]
 pub struct ListenArgs {
     /// Receive samples on this UDP port.
     #[arg(long, value_name = "PORT", conflicts_with = "stdin", required_unless_present = "stdin")]

@@ -39,9 +39,8 @@ pub struct RunArgs {
   stylet compare my_phantom.ron --algorithms Paper,Stylet --seeds 1400 --out out/compare
   stylet compare --world rich --seeds 200
 
-With --world the insertions come from the independent simulator (see `stylet benchmark diagnose`), with
-correct assumptions. Writes report.html and compare.json. Scenarios are replayed kinematically; the same
-seeds give the same bytes for any number of threads.")]
+Writes report.html and compare.json. With --world the insertions come from the independent simulator of
+`stylet benchmark diagnose`, with correct assumptions.")]
 pub struct CompareArgs {
     /// Scenario files (RON).
     #[arg(required_unless_present = "world")]
@@ -85,8 +84,8 @@ pub enum AlgorithmArg {
   stylet reproduce --out out/paper
   stylet reproduce --out out/second --first-seed 51     other noise, the same verdicts
 
-Writes index.html (to be read together with the paper's supplement), claims.json, switches.json and
-every figure as SVG. The same seeds give the same bytes for any number of threads.")]
+Writes index.html (to be read with the paper's supplement), claims.json, switches.json and every figure as
+SVG.")]
 pub struct ReproduceArgs {
     #[command(flatten)]
     pub results: OutputArgs,

@@ -11,10 +11,8 @@ use std::path::PathBuf;
   stylet studio monday.csv tuesday.csv --out work/phantom
   stylet studio --out work/phantom --no-open --port 8080
 
-Opens a page in the browser: drop a recording, look at contact, ruptures and enhanced force, draw the layers,
-diagnose, plan the next insertion. Everything it does is a file in the workspace and a command that it shows.
-The page is served to this computer only, at an address with a random token, and loads nothing from the
-network. The workspace is one folder: recordings, columns.ron, phantom.ron and a folder per result.")]
+Opens a page in the browser. Everything it does is a file in the workspace and a command that it shows. The
+page is served to this computer only, at an address with a random token, and loads nothing from the network.")]
 pub struct StudioArgs {
     /// Recordings to open; they are copied into the workspace.
     #[arg(value_name = "FILE")]

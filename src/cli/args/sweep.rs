@@ -33,10 +33,7 @@ impl From<SweepOverrides> for Overrides {
   stylet sweep scenarios/sweeps/noise.ron --resume      after an interruption
   stylet replay out/noise 123                           one trial with a full report
 
-Writes report.html, trials.csv, summary.json, and sweep.ron and scenario.ron, which repeat the sweep. The
-same sweep and seed give the same bytes for any number of threads.
-
-On a cluster: `stylet sweep plan SWEEP --shards N`, then `run-shard I/N` anywhere, then `merge`.")]
+Writes report.html, trials.csv, summary.json, and sweep.ron and scenario.ron, which repeat the sweep.")]
 pub struct SweepArgs {
     /// Step of a sweep that is spread over machines.
     #[command(subcommand)]
@@ -148,8 +145,7 @@ pub struct MapArgs {
 #[command(after_help = "Example:
   stylet replay stylet-out/noise 123
 
-Writes the files of `stylet run`; DIR/trial-123/scenario.ron is the trial's scenario, and `stylet run` on it
-repeats the trial.")]
+Writes the files of `stylet run`.")]
 pub struct ReplayArgs {
     /// Folder of a sweep's results.
     pub dir: PathBuf,

@@ -121,8 +121,8 @@ fn readme(count: usize) -> String {
 
 {count} streams, `streams/NNNN.csv`: `time_s,position_m,force_n` of a needle pushed through layered tissue (SI units; position positive
 into the tissue, force at the needle's base, positive when it resists). `streams.csv` has the rate of each. In the tissue the force rises
-with depth; when a layer is punctured its elastic part is released, while friction along the needle stays. Nothing else is known: not the
-position of the surface, not the number of layers.
+with depth; when a layer is punctured its elastic part is released, while friction along the needle stays. The position of the surface
+and the number of layers are unknown.
 
 Report each puncture as soon as you can, at the sample at which you know it. Only causal detectors count:
 
@@ -130,18 +130,19 @@ Report each puncture as soon as you can, at the sample at which you know it. Onl
 
 starts your program and gives it the streams sample by sample:
 
-    to you     start 200                    a new stream, rate in Hz; forget the previous one; no reply
+    input      start 200                    a new stream, rate in Hz: reset; no reply
                0.005,-0.0061,0.0123         time_s,position_m,force_n; reply one line at once
-    from you   event,drop_n,confidence,tip_force_n
+    output     event,drop_n,confidence,tip_force_n
 
-`event` is 1 when a puncture is reported at this sample. The other fields are optional numbers: size of the drop, confidence (larger is
-surer; a threshold on it is swept), force on the tip. Fields may be empty and trailing ones left out: an empty line says nothing.
+`event` is 1 when a puncture is reported at this sample. The other fields are optional numbers: size of the drop, confidence (any scale,
+larger is more certain; a threshold on it is swept), force on the tip. Fields may be empty and trailing ones left out: an empty line
+reports no puncture.
 
 A detector that does not run in a pipe may write `answers/mine/events.csv` itself, `stream,time_s,drop_n,confidence`, and optionally
 `answers/mine/enhanced/NNNN.csv`, `time_s,tip_force_n`.
 
-Judged with `stylet benchmark judge-online FOLDER answers/*` by whoever has the key: F1 with an event within 50 ms of the puncture, and
-before the needle has moved by 0.5 mm; missed and false ones, an event counting from 50 ms before to 1 s after a puncture; delay; false
+With the key, `stylet benchmark judge-online FOLDER answers/*` prints: F1 with an event within 50 ms of the puncture, and before the
+needle has moved by 0.5 mm; missed and false ones, an event counting from 50 ms before to 1 s after a puncture; delay; false
 alarms per hour. A layer may tear in steps: the first event counts, and further ones while it still tears are no false alarms.
 "
     )

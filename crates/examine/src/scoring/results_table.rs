@@ -80,7 +80,7 @@ pub fn results_text(outcomes: &[CaseOutcome]) -> String {
     let _ = writeln!(
         out,
         "{:<32}{:<20}{:<28}{:<28}{:<28}{:<10}{:>8}{:>8}",
-        "wrong", "hidden", "right, and alone", "all found", "a wrong name", "unknown", "med s", "p90 s"
+        "wrong", "hidden", "correct and alone", "all found", "false attribution", "unknown", "med s", "p90 s"
     );
     for c in table_cells(outcomes) {
         let row = match c.id.wrong {
@@ -127,7 +127,7 @@ fn together(out: &mut String, outcomes: &[CaseOutcome]) {
     for o in outcomes {
         by.entry((o.id.world, o.id.hide, o.id.size)).or_default().push(o);
     }
-    let _ = writeln!(out, "\nall rows together: right, and alone; a wrong name");
+    let _ = writeln!(out, "\nall rows together: correct and alone; false attribution");
     for ((world, hide, size), all) in by {
         let right = SuccessRate::of(&all, |o| o.worth.correct);
         let wrong = SuccessRate::of(&all, |o| o.worth.wrong_name);

@@ -44,7 +44,7 @@ class Diagnosis:
 
     @property
     def causes(self):
-        """A table: effect, parameter, value, low, high, whether it stands at a bound, confidence."""
+        """A table: effect, parameter, value, low, high, whether it is at a bound, confidence."""
         return _data.frame(self._rows())
 
     def _rows(self) -> list[dict]:

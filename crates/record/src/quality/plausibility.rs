@@ -23,7 +23,7 @@ pub(super) fn dead_sensor(samples: usize, extent: &Extent) -> Option<QualityNote
     let (low, high) = extent.force_n;
     (high - low <= CONSTANT_TOLERANCE * high.abs().max(low.abs()).max(1.0)).then(|| {
         let message = format!(
-            "the force stands at {high} N in all {samples} samples, without any noise: the sensor was off or not connected, or this is \
+            "the force is {high} N in all {samples} samples, without any noise: the sensor was off or not connected, or this is \
              another column; check the cable and the column map, and record again"
         );
         QualityNote::blocking(QualityKind::Dead, message, [("value", high)])
@@ -37,7 +37,7 @@ pub(super) fn no_motion(extent: &Extent) -> Option<QualityNote> {
     let (low, high) = extent.position_m;
     (high - low < MIN_TRAVEL_M).then(|| {
         let message = format!(
-            "the position stands at {high} m: the needle does not move, or this is another column; check the encoder and the column map"
+            "the position is {high} m in all samples: the needle does not move, or this is another column; check the encoder and the column map"
         );
         QualityNote::blocking(QualityKind::Stuck, message, [("value", high), ("travel_m", high - low)])
     })
@@ -110,7 +110,7 @@ pub(super) fn stuck_force<A: SampleStream>(
     })?;
     Ok((intervals > 0).then(|| {
         let message = format!(
-            "the force stands still at {value:.4} N for {longest} samples from t = {at_s:.4} s while the needle moves ({intervals} such \
+            "the force stays at {value:.4} N for {longest} samples from t = {at_s:.4} s while the needle moves ({intervals} such \
              interval(s)): the logger probably repeated its last value; cut the interval out or record again"
         );
         let numbers =

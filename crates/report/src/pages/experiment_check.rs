@@ -15,7 +15,7 @@ pub fn summary_sentence(check: &ExperimentCheck) -> &'static str {
     if !check.is_usable() {
         "A diagnosis of these recordings would mean nothing."
     } else if check.items.iter().all(|item| item.light == Light::Good) {
-        "Nothing stands against a diagnosis."
+        "The recordings suffice for a diagnosis."
     } else {
         "A diagnosis is possible, within the limits below."
     }

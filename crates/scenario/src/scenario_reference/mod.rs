@@ -1,7 +1,7 @@
 //! The reference pages of the scenario format and of the effects library, generated from the schema.
 //!
-//! [`scenario_page`] and [`effects_page`] are the contents of `docs/reference/scenario.md` and `docs/reference/effects.md`, [`effects_table`] is the
-//! table in `docs/reference/model.md`. Defaults and example values are read from RON that the parser accepts. The test
+//! [`scenario_page`] and [`effects_page`] are the contents of `docs/reference/scenario.md` and `docs/reference/effects.md`, [`effects_by_stage`] is the
+//! table in `docs/reference/model.md`, [`custom_variables`] that in `docs/how-to/custom_effects.md`. Defaults and example values are read from RON that the parser accepts. The test
 //! `tests/promises/reference_pages.rs` compares the files with these functions.
 
 use crate::load_ron::parse;
@@ -68,9 +68,11 @@ fn value_at<'a>(text: &'a str, path: &str) -> Option<&'a str> {
     text.get(entry.start..entry.end)
 }
 
-/// A value in one line; what is inside the brackets of a long one is left out.
+/// A value in one line, as a user would write it; what is inside the brackets of a long one is left out.
 fn brief(value: &str, max_length: usize) -> String {
     let line = value.split_whitespace().collect::<Vec<_>>().join(" ");
+    // The writer gives fields lines of their own, and marks names that Rust reserves.
+    let line = line.replace("( ", "(").replace(", )", ")").replace("r#", "");
     match line.find(['(', '[']) {
         Some(0) if line.len() > max_length && line.starts_with('[') => "[...]".to_owned(),
         Some(bracket) if line.len() > max_length => format!("{}(...)", &line[..bracket]),
@@ -95,32 +97,22 @@ fn default_of(section: &Section, path: &str) -> String {
     }
 }
 
-/// `docs/reference/scenario.md`: every field of a scenario with default, unit, range, meaning and a line to paste.
+/// `docs/reference/scenario.md`: every field of a scenario with default, unit, range and meaning, and lines to paste.
 #[must_use]
 pub fn scenario_page() -> String {
     let mut page = "# Scenario reference\n\n\
-        Generated from the schema; `cargo test -p stylet-scenario reference` with `STYLET_BLESS=1` writes it again.\n\n\
-        A scenario is a RON file, `Scenario(...)`. Unknown fields are errors that point at line and column. All values are in SI units. Comments begin with `//`.\n\
-        An optional value is written as such: `puncture_n: 0.8` and `puncture_n: Some(0.8)` are the same. [model.md](model.md) has the equations, [effects.md](effects.md)\n\
-        the fields of the effects, [files.md](files.md) the other files.\n\n"
+        Every field of a scenario, a RON file `Scenario(...)`. [Files](files.md) has the common rules of all files, [Model](model.md) the equations. This page is generated.\n\n"
         .to_owned();
     for section in sections() {
         let _ = writeln!(page, "## {}\n", section.title);
         if !section.intro.is_empty() {
             let _ = writeln!(page, "{}\n", section.intro);
         }
-        page += "| field | default | unit | range | meaning | line |\n|---|---|---|---|---|---|\n";
+        page += "| field | default | unit | range | meaning |\n|---|---|---|---|---|\n";
         for (name, unit, range, meaning) in &section.fields {
             let path = format!("{}{name}", section.prefix);
-            let value = value_at(&scenario_with(&section.example), &path)
-                .map(|value| brief(value, 130))
-                .unwrap_or_default();
-            let field = name.rsplit(['.', ']']).next().unwrap_or(name);
             let default = default_of(&section, &path);
-            let _ = writeln!(
-                page,
-                "| `{name}` | {default} | {unit} | {range} | {meaning} | `{field}: {value}` |"
-            );
+            let _ = writeln!(page, "| `{name}` | {default} | {unit} | {range} | {meaning} |");
         }
         let _ = writeln!(page, "\n```ron\n{}\n```\n", section.example);
     }
@@ -152,31 +144,31 @@ fn range(p: &ParameterInfo) -> String {
     }
 }
 
-/// Names, equations and places of all effects: the table in `docs/reference/model.md`.
+/// The effects of each stage, in the order of evaluation: the table in `docs/reference/model.md`.
 #[must_use]
-pub fn effects_table() -> String {
-    let mut table = "| effect | acts on | equation |\n|---|---|---|\n".to_owned();
+pub fn effects_by_stage() -> String {
+    let mut stages: Vec<(String, Vec<String>)> = Vec::new();
     for info in all_effects() {
-        let place = format!("{:?}", info.stage).to_lowercase();
-        let _ = writeln!(
-            table,
-            "| [`{}`](effects.md#{}) | {place} | `{}` |",
-            info.id,
-            info.id,
-            info.equation.replace('|', "\\|")
-        );
+        let stage = format!("{:?}", info.stage).to_lowercase();
+        let link = format!("[`{}`](effects.md#{})", info.id, info.id);
+        match stages.iter_mut().find(|(name, _)| *name == stage) {
+            Some((_, links)) => links.push(link),
+            None => stages.push((stage, vec![link])),
+        }
     }
-    table
+    stages.into_iter().fold("| stage | effects |\n|---|---|\n".to_owned(), |mut table, (stage, links)| {
+        let _ = writeln!(table, "| {stage} | {} |", links.join(", "));
+        table
+    })
 }
 
 /// `docs/reference/effects.md`: every effect with equation, source, signature, parameters and a line to paste.
 #[must_use]
 pub fn effects_page() -> String {
     let mut page = "# Effects reference\n\n\
-        Generated from the library; `cargo test -p stylet-scenario reference` with `STYLET_BLESS=1` writes it again.\n\n\
-        Every effect has one name: `coulomb_friction` in outputs and on the command line, `CoulombFriction` in scenarios. Lines go into the list `effects: [...]` of a\n\
-        scenario. *Inactive* is the value at which a parameter has no effect, *typical* where a fit starts. Symbols: [model.md](model.md#symbols-and-signs).\n\n\
-        The pictures show the force of one insertion without and with the effect, and the difference; some have another size than the typical one, so that it can be seen.\n\n"
+        An effect is `coulomb_friction` in outputs and on the command line, `CoulombFriction` in the list `effects: [...]` of a scenario. Per effect: equation\n\
+        ([symbols](model.md#symbols-and-signs)), a line to paste, parameters (*inactive*: the value without effect, *typical*: where a fit starts), the force of one insertion without and\n\
+        with it, how to recognise it, and a source. Pictures and lines may have another size than the typical one. This page is generated. [Custom effects](../how-to/custom_effects.md) are formulas of your own.\n\n"
         .to_owned();
     let mut heading = "General effects";
     let _ = writeln!(page, "## {heading}\n");
@@ -209,32 +201,26 @@ pub fn effects_page() -> String {
         }
         let _ = writeln!(
             page,
-            "\n![Force without and with {}](../figures/effects/{}.svg)\n\nSignature: {}\nSource: {}.\n",
+            "\n![{}](../figures/effects/{}.svg)\n\n{} Source: {}.\n",
             info.id,
             info.id,
             info.signature,
             info.source.trim_end_matches('.')
         );
     }
-    page += &custom_effects_section();
     page.truncate(page.trim_end().len());
     page + "\n"
 }
 
-/// The fields of custom effects, and the variables of their formulas.
-fn custom_effects_section() -> String {
-    let mut section = "## Custom effects\n\n\
-        `Custom(...)` is an effect given by formulas: [how to use it](../how-to/custom_effects.md).\n\n```ron\n\
-        Custom(name: \"ageing_friction\", place: Friction, force: \"c * sgn(v) * inserted * (1 + travel/l)\", parameters: {\n    \
-        c: (start: 3.0, unit: \"N/m\", inactive: 0.0),\n    \
-        l: (start: 0.02, prior: LogNormal(median: 0.02, factor: 3.0), unit: \"m\"),\n\
-        }),\n```\n\n| variable | unit | meaning | places |\n|---|---|---|---|\n"
-        .to_owned();
+/// The variables in the formulas of custom effects: the table in `docs/how-to/custom_effects.md`.
+#[must_use]
+pub fn custom_variables() -> String {
+    let mut table = "| variable | unit | meaning | places |\n|---|---|---|---|\n".to_owned();
     for v in &VARIABLES {
         let places: Vec<String> = v.places.iter().map(|place| format!("`{place:?}`")).collect();
-        let _ = writeln!(section, "| `{}` | {} | {} | {} |", v.name, v.unit, v.meaning, places.join(", "));
+        let _ = writeln!(table, "| `{}` | {} | {} | {} |", v.name, v.unit, v.meaning, places.join(", "));
     }
-    section
+    table
 }
 
 #[cfg(test)]

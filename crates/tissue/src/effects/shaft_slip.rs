@@ -108,7 +108,7 @@ static INFO: EffectInfo = EffectInfo {
     id: "shaft_slip",
     equation: "F = E - q1 - q2, E = K w + b w|w|, w' = z' - v0 sgn(F) (|F|/L)^m once broken, w = z - s_i before; F = r C at the rupture",
     source: "Power-law creep of dragged contacts (Persson 2000) with Maxwell relaxation; measured skin and muscle phantoms",
-    signature: "A flat hold after a speed_factor first fall, a reversal that takes millimetres, a plateau that hardly depends on speed.",
+    signature: "A flat hold after a fast first fall, a reversal that takes millimetres, a plateau that hardly depends on speed.",
     stage: ChainStage::Friction,
     parameters: &[
         LAYER,
