@@ -32,6 +32,7 @@ use crate::zero_steps::{ZeroStepReport, zero_effects};
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
 use stylet_identify::likelihood::FitData;
+use stylet_record::QualityKind;
 use stylet_scenario::Scenario;
 use stylet_stats::parallel::*;
 use stylet_tissue::Effect;
@@ -224,8 +225,9 @@ pub(crate) fn diagnose_given_layers(
     };
     let mut data_quality = Vec::new();
     for (r, notes) in recordings.iter().zip(notes) {
+        let notes = notes.into_iter().filter(|note| note.kind != QualityKind::Converted);
         data_quality
-            .extend(notes.into_iter().map(|note| DataQualityNote { recording: r.name.clone(), note }));
+            .extend(notes.map(|note| DataQualityNote { recording: r.name.clone(), note }));
     }
     let (parameters, covariance) = labels_of_causes(assessment.labels, &causes);
     if !options.brief {

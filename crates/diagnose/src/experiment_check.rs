@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use stylet_core::{EnhanceConfig, Sample};
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
-use stylet_record::{QualityNote, Recording};
+use stylet_record::{QualityKind, QualityNote, Recording};
 use stylet_scenario::Scenario;
 use stylet_score::{ContactFinding, ContactHypothesis, Trace};
 use stylet_stats::parallel::*;
@@ -90,7 +90,9 @@ pub(crate) fn check_before_fit(
     notes: &[Vec<QualityNote>],
 ) -> Vec<CheckItem> {
     let mut items = Vec::new();
-    for (r, note) in recordings.iter().zip(notes).flat_map(|(r, notes)| notes.iter().map(move |n| (r, n))) {
+    let all = recordings.iter().zip(notes).flat_map(|(r, notes)| notes.iter().map(move |n| (r, n)));
+    let (converted, remarks): (Vec<_>, Vec<_>) = all.partition(|(_, n)| n.kind == QualityKind::Converted);
+    for (r, note) in remarks {
         let light = if note.blocking { Light::Unusable } else { Light::Limited };
         items.push(CheckItem::new("recordings", light, format!("{}: {}", r.name, note.message)));
     }
@@ -99,6 +101,12 @@ pub(crate) fn check_before_fit(
         let hz = stylet_stats::median_of(clean.iter().map(Recording::sample_hz));
         let message = format!("{what} without gaps or spikes, {hz:.0} Hz");
         items.push(CheckItem::new("recordings", Light::Good, message));
+    }
+    let mut conversions: Vec<&str> = converted.iter().map(|(_, note)| note.message.as_str()).collect();
+    let mut known = std::collections::BTreeSet::new();
+    conversions.retain(|message| known.insert(*message));
+    if !conversions.is_empty() {
+        items.push(CheckItem::new("recordings", Light::Good, conversions.join("; ")));
     }
     if clean.len() == 1 {
         let message = "one recording: no prediction can be tested on another; record at least two";

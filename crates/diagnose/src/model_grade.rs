@@ -25,14 +25,24 @@ pub fn grade(d: &Diagnosis, resolution_n: f64) -> Grade {
         parts.push(GradePart { part: part.to_owned(), letter, reason });
     };
     let g = &d.gain;
-    let ratio = g.rmse_given_scatter_n / g.floor_n.max(resolution_n).max(f64::MIN_POSITIVE);
+    let noise_n = g.floor_n.max(resolution_n).max(f64::MIN_POSITIVE);
+    // Where the model predicts worse than the base law, its error counts with the scatter between recordings.
+    let worse = g.rmse_after_n > g.rmse_before_n && g.rmse_after_n > MAX_ERROR[0] * noise_n;
+    let ratio = if worse { g.rmse_after_n } else { g.rmse_given_scatter_n } / noise_n;
     let what = if g.held_out { "held-out recordings are predicted" } else { "the recording is fitted" };
     // The floor of repeats is how well they predict one another.
     let floor = if g.floor_n > d.noise.sd_n { "repeatability" } else { "noise" };
+    let scatter = if worse {
+        ", worse than by the base law"
+    } else if floor == "noise" && g.rmse_after_n > MAX_ERROR[0] * g.rmse_given_scatter_n.max(noise_n) {
+        ", given the ruptures, surface and friction of each"
+    } else {
+        ""
+    };
     add(
         "error",
         of_rank(rank(ratio, MAX_ERROR)),
-        format!("{what} to {} times the {floor}", significant(ratio, 2)),
+        format!("{what} to {} times the {floor}{scatter}", significant(ratio, 2)),
     );
     let depends = d.residual_structure.depends_on.join(", ");
     match (d.verdict, d.residual_structure.p_value < SIGNIFICANT_P_VALUE) {

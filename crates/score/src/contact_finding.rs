@@ -106,7 +106,7 @@ impl ContactFinding {
             ContactHypothesis::BeginsLoaded => {
                 return format!("the recording begins loaded, as given ({setting}); forces are absolute");
             }
-            ContactHypothesis::ConstantOffset => "a constant offset".to_owned(),
+            ContactHypothesis::ConstantOffset => format!("a constant offset of {:.3} N", b.offset_n + 0.0),
             ContactHypothesis::ZeroStep => format!("{steps} step(s) of the zero"),
             ContactHypothesis::DriftInTime => format!("a drift of {} mN/s", drift()),
             ContactHypothesis::LineInPosition => format!("a force of {} N/m linear in position", line()),
@@ -120,9 +120,9 @@ impl ContactFinding {
         };
         let place = match (self.contact_m, self.contact_interval_m) {
             (Some(z), Some([low, high])) => {
-                format!("contact at {:.2} mm (95 %: {:.2} to {:.2})", 1e3 * z, 1e3 * low, 1e3 * high)
+                format!("contact at {} mm (95 %: {} to {})", millimetres(z), millimetres(low), millimetres(high))
             }
-            (Some(z), None) => format!("contact at {:.2} mm", 1e3 * z),
+            (Some(z), None) => format!("contact at {} mm", millimetres(z)),
             _ => "no contact yet".to_owned(),
         };
         format!("{place}, after {before} ({setting})")
@@ -145,6 +145,12 @@ impl ContactFinding {
     pub fn is_remarkable(&self) -> bool {
         self.hypothesis != ContactHypothesis::ConstantOffset || !self.zero_steps.is_empty()
     }
+}
+
+/// A length in mm with two decimals; no negative zero.
+fn millimetres(metres: f64) -> String {
+    let text = format!("{:.2}", 1e3 * metres);
+    if text == "-0.00" { "0.00".to_owned() } else { text }
 }
 
 /// Mean squares in N² of the errors of a start in air and of one in the tissue, and the mean product of neighbouring errors of the first.

@@ -23,7 +23,8 @@ pub(super) fn millimetres(metres: f64) -> String {
 }
 
 pub(super) fn section(report: &RunReport) -> Section {
-    let mut section = Section::new("Score");
+    let is_scored = report.combinations.iter().any(|c| c.score.is_some());
+    let mut section = Section::new(if is_scored { "Score" } else { "Detections and estimates" });
     if !report.notes.is_empty() {
         section = section.warnings(report.notes.clone());
     }
@@ -131,8 +132,9 @@ fn unscored(combination: &Combination) -> Vec<Tile> {
     if let Some(contact_s) = combination.contact_s {
         tiles.push(Tile::new("First contact", format!("{} s", significant(contact_s, 4)), ""));
     }
-    if let Some(last) = combination.cumulative_friction_ns_per_m.iter().rev().find(|d| d.is_finite()) {
-        tiles.push(Tile::new("Cumulative friction D", significant(*last, 3), "N s/m at the end"));
+    let friction = combination.cumulative_friction_ns_per_m.iter().copied().filter(|d| d.is_finite());
+    if let Some(largest) = friction.reduce(f64::max) {
+        tiles.push(Tile::new("Cumulative friction D", significant(largest, 3), "N s/m, largest"));
     }
     for layer in &combination.layers {
         if let Some(stiffness) = layer.stiffness_n_per_m {
