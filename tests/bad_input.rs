@@ -112,6 +112,13 @@ fn an_invalid_recording_is_refused_with_line_and_column() {
 }
 
 #[test]
+fn a_recording_in_place_of_an_option_is_refused_with_the_option() {
+    let out = Scratch::new("recording-without-option").path().join("out");
+    let arguments = ["diagnose", "a.csv", "b.csv", "--out", out.to_str().expect("a path")];
+    refused(&arguments, &out, &["'b.csv'", "recordings follow the option `--data`"]);
+}
+
+#[test]
 fn an_invalid_configuration_or_column_map_is_refused() {
     let scratch = Scratch::new("bad-config");
     let out = scratch.path().join("out");

@@ -32,13 +32,18 @@ mod text_plot;
 
 use args::{Cli, Command};
 use clap::Parser;
-use clap::error::{ContextKind, ContextValue};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use exit_codes::Failure;
+use std::path::Path;
 use std::process::ExitCode;
+
+/// Extensions of files with recordings.
+const RECORDING_EXTENSIONS: [&str; 11] =
+    ["csv", "txt", "tsv", "xlsx", "ods", "mat", "h5", "hdf5", "parquet", "mcap", "db3"];
 
 /// The parsed arguments. Ends the process on wrong ones; a name of an earlier version is refused with the new one.
 fn arguments() -> Cli {
-    Cli::try_parse().unwrap_or_else(|error| {
+    Cli::try_parse().unwrap_or_else(|mut error| {
         let renamed = [ContextKind::InvalidArg, ContextKind::InvalidSubcommand].into_iter().find_map(
             |kind| match error.get(kind) {
                 Some(ContextValue::String(name)) => stylet_scenario::renamed_flag(name),
@@ -50,9 +55,23 @@ fn arguments() -> Cli {
                 terminal_output::print_error(&format!("error: {message}\n"));
                 std::process::exit(i32::from(exit_codes::INPUT_WRONG));
             }
-            None => error.exit(),
+            None => {
+                if is_recording_without_option(&error) {
+                    let tip = "recordings follow the option `--data`".to_owned().into();
+                    error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip]));
+                }
+                error.exit()
+            }
         }
     })
+}
+
+/// Whether an argument that no command takes is a file of the kinds that hold recordings.
+fn is_recording_without_option(error: &clap::Error) -> bool {
+    let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidArg) else { return false };
+    let extension = Path::new(name).extension().map(std::ffi::OsStr::to_ascii_lowercase);
+    error.kind() == ErrorKind::UnknownArgument
+        && extension.is_some_and(|e| RECORDING_EXTENSIONS.iter().any(|known| e == *known))
 }
 
 /// Limit on the memory for reading files, in bytes.

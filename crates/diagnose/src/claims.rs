@@ -133,12 +133,13 @@ fn findings(d: &Diagnosis, context: &Context) -> Vec<Finding> {
 /// Predictions that miss by more than noise and scatter between recordings explain.
 fn prediction_error(g: &Gain, resolution_n: f64) -> Option<String> {
     let floor_n = g.floor_n.max(resolution_n);
-    (g.rmse_given_scatter_n > MAX_ERROR_RATIO * floor_n && floor_n > 0.0).then(|| {
+    let misfit_n = g.misfit_n();
+    (misfit_n > MAX_ERROR_RATIO * floor_n && floor_n > 0.0).then(|| {
         let what = if g.held_out { "held-out recordings are predicted" } else { "the recording is fitted" };
         format!(
             "{what} to {} N, {} times the noise of {} N",
-            significant(g.rmse_given_scatter_n, 3),
-            significant(g.rmse_given_scatter_n / floor_n, 2),
+            significant(misfit_n, 3),
+            significant(misfit_n / floor_n, 2),
             significant(floor_n, 3)
         )
     })

@@ -251,6 +251,24 @@ pub struct Gain {
     pub per_recording_n: Vec<(f64, f64)>,
 }
 
+/// A model predicts worse than the base law when its RMS error is larger by this factor.
+const MIN_WORSENING: f64 = 1.25;
+
+impl Gain {
+    /// Whether held-out recordings are predicted worse than by the base law.
+    #[must_use]
+    pub fn is_worse(&self) -> bool {
+        self.rmse_after_n > MIN_WORSENING * self.rmse_before_n
+    }
+
+    /// RMS error in N that contradicts the model: beyond the scatter between recordings, or the whole error of a model that predicts
+    /// worse than the base law.
+    #[must_use]
+    pub fn misfit_n(&self) -> f64 {
+        if self.is_worse() { self.rmse_after_n } else { self.rmse_given_scatter_n }
+    }
+}
+
 /// Structure that remains in the residual.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ResidualStructureReport {

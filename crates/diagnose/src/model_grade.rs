@@ -26,13 +26,11 @@ pub fn grade(d: &Diagnosis, resolution_n: f64) -> Grade {
     };
     let g = &d.gain;
     let noise_n = g.floor_n.max(resolution_n).max(f64::MIN_POSITIVE);
-    // Where the model predicts worse than the base law, its error counts with the scatter between recordings.
-    let worse = g.rmse_after_n > g.rmse_before_n && g.rmse_after_n > MAX_ERROR[0] * noise_n;
-    let ratio = if worse { g.rmse_after_n } else { g.rmse_given_scatter_n } / noise_n;
+    let ratio = g.misfit_n() / noise_n;
     let what = if g.held_out { "held-out recordings are predicted" } else { "the recording is fitted" };
     // The floor of repeats is how well they predict one another.
     let floor = if g.floor_n > d.noise.sd_n { "repeatability" } else { "noise" };
-    let scatter = if worse {
+    let scatter = if g.is_worse() {
         ", worse than by the base law"
     } else if floor == "noise" && g.rmse_after_n > MAX_ERROR[0] * g.rmse_given_scatter_n.max(noise_n) {
         ", given the ruptures, surface and friction of each"
@@ -94,6 +92,24 @@ fn of_rank(rank: usize) -> Letter {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_model_that_predicts_worse_than_the_base_law_has_no_good_grade() {
+        let text = r#"{"verdict": "named", "causes": [], "not_identifiable": [], "data_quality": [], "search_steps": [], "advice": [],
+            "base_parameters": [], "gain": {"held_out": true, "recordings": ["a", "b"], "rmse_before_n": 0.182, "rmse_after_n": 0.2,
+            "rmse_given_scatter_n": 0.0093, "floor_n": 0.0093, "per_recording_n": []},
+            "residual_structure": {"p_value": 0.4, "depends_on": [], "nats": 0}, "noise": {"sd_n": 0.0093, "ar": [0, 0], "from_air": false}}"#;
+        let mut d: Diagnosis = serde_json::from_str(text).expect("a diagnosis");
+        let of = |d: &Diagnosis| {
+            let g = grade(d, 0.0);
+            (g.letter, g.parts[0].reason.clone())
+        };
+        let known = "held-out recordings are predicted to 1 times the noise, given the ruptures, surface and friction of each";
+        assert_eq!(of(&d), (Letter::A, known.to_owned()));
+        d.gain.rmse_after_n = 0.388;
+        let worse = "held-out recordings are predicted to 42 times the noise, worse than by the base law";
+        assert_eq!(of(&d), (Letter::D, worse.to_owned()));
+    }
 
     #[test]
     fn a_grade_is_as_good_as_its_worst_part() {

@@ -49,7 +49,7 @@ fn predictions_to_the_noise_agree() {
     assert!(d.agrees && d.findings.is_empty() && d.verdict == Verdict::None);
     // At twice the noise, and with large scatter that is known, they still do.
     d.gain.rmse_given_scatter_n = 0.04;
-    d.gain.rmse_after_n = 0.6;
+    (d.gain.rmse_before_n, d.gain.rmse_after_n) = (0.6, 0.6);
     d.random_effect_sd.puncture = 0.29;
     d.random_effect_sd.rupture_depth_m = 4.9e-3;
     apply(&mut d, &SENSOR);
