@@ -226,8 +226,7 @@ pub(crate) fn diagnose_given_layers(
     let mut data_quality = Vec::new();
     for (r, notes) in recordings.iter().zip(notes) {
         let notes = notes.into_iter().filter(|note| note.kind != QualityKind::Converted);
-        data_quality
-            .extend(notes.map(|note| DataQualityNote { recording: r.name.clone(), note }));
+        data_quality.extend(notes.map(|note| DataQualityNote { recording: r.name.clone(), note }));
     }
     let (parameters, covariance) = labels_of_causes(assessment.labels, &causes);
     if !options.brief {

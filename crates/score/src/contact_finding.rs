@@ -120,7 +120,12 @@ impl ContactFinding {
         };
         let place = match (self.contact_m, self.contact_interval_m) {
             (Some(z), Some([low, high])) => {
-                format!("contact at {} mm (95 %: {} to {})", millimetres(z), millimetres(low), millimetres(high))
+                format!(
+                    "contact at {} mm (95 %: {} to {})",
+                    millimetres(z),
+                    millimetres(low),
+                    millimetres(high)
+                )
             }
             (Some(z), None) => format!("contact at {} mm", millimetres(z)),
             _ => "no contact yet".to_owned(),

@@ -55,6 +55,9 @@ pub struct Trace {
     pub baseline: Baseline,
     /// Samples that the core ignored.
     pub unused: usize,
+    /// Time in s from which the core's own friction replaced that of a model
+    /// ([`EnhancerWithModel`](crate::EnhancerWithModel::model_rejected_s)).
+    pub model_rejected_s: Option<f64>,
     /// Number of times that the core was re-initialised because of a new clock.
     pub restarts: usize,
     /// Index of the first estimate since the last restart, after which layers are counted from 1 again.
@@ -124,6 +127,7 @@ impl Trace {
             trace.record_events(&out);
         }
         trace.contact = assessor.finish(config.contact);
+        trace.model_rejected_s = core.model_rejected_s();
         trace.contact_s =
             trace.contact_m.and_then(|z| recording.samples().find(|s| s.position_m >= z)).map(|s| s.time_s);
         trace

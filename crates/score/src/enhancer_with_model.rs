@@ -76,16 +76,51 @@ impl RecordingScale {
 /// The model maps a sample and the number of ruptures that the core has declared so far to the friction in N. Ruptures come
 /// from the core, not from the model: their places differ by millimetres between insertions, the friction behind begins
 /// there, and the core detects them within samples.
+///
+/// In retraction nothing pushes on the tip, so the enhanced force should be zero. As long as the model leaves a larger mean square
+/// there than the core's own friction, the core's own friction is used.
 pub struct EnhancerWithModel<M> {
     core: Enhancer<Vec<Sample>>,
     model: Option<M>,
+    retraction: RetractionErrors,
+}
+
+/// Enhanced force in retraction with the core's own friction and with the model's.
+#[derive(Clone, Copy, Debug, Default)]
+struct RetractionErrors {
+    deepest_m: Option<f64>,
+    core_n2: f64,
+    model_n2: f64,
+    /// First time in s at which the model was worse.
+    model_rejected_s: Option<f64>,
+}
+
+/// Distance in m from the deepest position after which a retracting tip carries no force: the tissue in front of it is unloaded.
+const UNLOADING_M: f64 = 1e-3;
+
+impl RetractionErrors {
+    fn push(&mut self, sample: &Sample, core_n: f64, model_n: f64) {
+        let deepest_m = self.deepest_m.map_or(sample.position_m, |m| m.max(sample.position_m));
+        self.deepest_m = Some(deepest_m);
+        if sample.velocity_mps < 0.0 && sample.position_m < deepest_m - UNLOADING_M {
+            self.core_n2 += core_n * core_n;
+            self.model_n2 += model_n * model_n;
+        }
+        if !self.is_model_better() {
+            self.model_rejected_s.get_or_insert(sample.time_s);
+        }
+    }
+
+    fn is_model_better(&self) -> bool {
+        self.model_n2 <= self.core_n2
+    }
 }
 
 impl<M: FnMut(&Sample, usize) -> f64> EnhancerWithModel<M> {
     /// Algorithms that take no model ignore it.
     #[must_use]
     pub fn new(core: Enhancer<Vec<Sample>>, model: Option<M>) -> Self {
-        Self { core, model }
+        Self { core, model, retraction: RetractionErrors::default() }
     }
 
     /// Processes one sample. With a model, enhanced force and band are those of [`Enhancer::apply_model_friction`]. The values of
@@ -97,11 +132,23 @@ impl<M: FnMut(&Sample, usize) -> f64> EnhancerWithModel<M> {
         }
         if let Some(model) = &mut self.model {
             let friction_n = model(&sample, out.ruptures);
+            if out.restarted {
+                self.retraction = RetractionErrors::default();
+            }
             if let Some((enhanced_n, band_n)) = self.core.apply_model_friction(friction_n) {
-                (out.enhanced_n, out.band_n) = (enhanced_n, Some(band_n));
+                self.retraction.push(&sample, out.enhanced_n, enhanced_n);
+                if self.retraction.is_model_better() {
+                    (out.enhanced_n, out.band_n) = (enhanced_n, Some(band_n));
+                }
             }
         }
         out
+    }
+
+    /// Time in s from which the core's own friction was used, because the model's was worse in retraction.
+    #[must_use]
+    pub fn model_rejected_s(&self) -> Option<f64> {
+        self.retraction.model_rejected_s
     }
 }
 
@@ -151,5 +198,31 @@ mod tests {
             assert_eq!(*received.last().unwrap_or(&0), 1, "{algorithm:?} detects the drop");
             assert_eq!(different > 0, algorithm == Algorithm::Stylet);
         }
+    }
+
+    #[test]
+    fn a_model_that_is_worse_in_retraction_is_left_for_the_friction_of_the_core() {
+        // In, and out again: friction of 1 N against the motion, and nothing at the tip on the way back.
+        let motion = |k: usize| match sample(k) {
+            s if k < 2000 => s,
+            s => {
+                let back = 0.005 * (k - 2000) as f64;
+                let noise_n = 0.01 * (12.9898 * k as f64).sin();
+                Sample { position_m: 0.04 - 0.005 * back, velocity_mps: -0.005, force_n: noise_n - 1.0, ..s }
+            }
+        };
+        let mean_square = |friction_n: f64| {
+            let core = enhancer_for(3500, &EnhanceConfig::default(), 0.0);
+            let model = |s: &Sample, ruptures: usize| friction_n * ruptures as f64 * s.velocity_mps.signum();
+            let mut with = EnhancerWithModel::new(core, Some(model));
+            let outputs: Vec<f64> = (0..3500).map(|k| with.step(motion(k)).enhanced_n).collect();
+            let back = &outputs[2300..];
+            (back.iter().map(|n| n * n).sum::<f64>() / back.len() as f64, with.model_rejected_s())
+        };
+        let (right, rejected_s) = mean_square(1.0);
+        assert!(right < 0.01 && rejected_s.is_none(), "{right} {rejected_s:?}");
+        let (wrong, rejected_s) = mean_square(5.0);
+        assert!(rejected_s.is_some_and(|t| t > 10.0), "{rejected_s:?}");
+        assert!(wrong < 0.1, "{wrong}");
     }
 }

@@ -85,6 +85,11 @@ impl IdentifiedModel {
                 1e3 * contact_m
             ));
         }
+        if let Some(at_s) = trace.model_rejected_s {
+            warnings.push(format!(
+                "from {at_s:.2} s on the friction of {file} leaves more force in retraction than the core's own, which is used while that is so"
+            ));
+        }
         if trace.detections.len() > *layers {
             warnings.push(format!(
                 "{} ruptures were detected and {file} has {layers} layer(s): further ruptures do not change the model",

@@ -162,8 +162,9 @@ impl Pass {
             index += 1;
             Ok(())
         })?;
-        for (run, assessor) in runs.iter_mut().zip(&assessors) {
+        for ((run, assessor), enhancer) in runs.iter_mut().zip(&assessors).zip(&enhancers) {
             run.trace.contact = assessor.finish(run.config.contact);
+            run.trace.model_rejected_s = enhancer.model_rejected_s();
         }
         Ok(Self { runs, table, columns, plot })
     }
