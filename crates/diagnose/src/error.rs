@@ -12,12 +12,12 @@ pub enum DiagnoseError {
          scenario"
     )]
     NoContact,
-    /// Fewer layers in the recordings than asked for.
+    /// The recordings show fewer layers than requested.
     #[error(
         "the recordings show {found} layer(s), not {asked}; leave the number away, or describe the layers in a scenario"
     )]
     FewerLayers {
-        /// Layers asked for.
+        /// Requested number of layers.
         asked: usize,
         /// Layers found.
         found: usize,
@@ -54,7 +54,7 @@ pub enum DiagnoseError {
         deepest_m: f64,
         /// Surface.
         surface_m: f64,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// The needle starts behind the tissue.

@@ -10,7 +10,7 @@ const MAX_RUPTURE_STEP_BLOCKS: f64 = 1.5;
 
 /// Smallest extrapolation factor that is tried; below it, the gain is not worth a further replay.
 const MIN_EXTRAPOLATION: f64 = 1.3;
-/// Largest extrapolation factor: beyond it, the linearization does not hold.
+/// Largest extrapolation factor, which limits the error of the parabola.
 const MAX_EXTRAPOLATION: f64 = 4.0;
 
 /// Clamps every shared parameter to its bounds.

@@ -55,7 +55,7 @@ fn between(times: &[f64], from_s: f64, to_s: f64) -> &[f64] {
 }
 
 /// Duration (s) of the transient after a velocity jump or rupture, in which a compliant needle or a lagging sensor is evaluated at every
-/// sample; several of their time constants.
+/// sample instead of once per piece.
 const TRANSIENT_S: f64 = 0.3;
 /// Relative velocity difference up to which neighbouring pieces belong to one motion; a velocity jump is larger.
 const SAME_MOTION_SHARE: f64 = 0.3;

@@ -3,7 +3,7 @@
 use super::{Model, Parameter, ParameterRole as Role};
 use stylet_tissue::{FitScale, Proposal};
 
-/// Lower bound of stiffness, friction and puncture force, as a share of the assumed value: positive, but out of the way.
+/// Lower bound of stiffness, friction and puncture force, as a share of the assumed value.
 const MIN_SHARE_OF_ASSUMED: f64 = 0.02;
 /// Half width of the bounds of surface and thicknesses, in tolerances.
 const MAX_TOLERANCES: f64 = 2.0;

@@ -7,7 +7,7 @@
 use core::f64::consts::{PI, TAU};
 use stylet_stats::linear_algebra::SymmetricMatrix;
 
-/// Highest frequency (Hz) that is searched: a hand or a drive with a payload oscillates more slowly.
+/// Highest frequency (Hz) that is searched; faster motion is left to local windows.
 const HIGHEST_HZ: f64 = 3.0;
 /// Length in s of the means used in the frequency search.
 const SEARCH_MEAN_S: f64 = 0.1;

@@ -9,8 +9,8 @@ const HALF_WINDOWS: [usize; 8] = [3, 5, 8, 12, 18, 27, 40, 60];
 const INTERVAL_SDS: f64 = 2.2;
 /// Largest residual of a segment, as a multiple of the position noise.
 const MAX_NOISE_RATIO: f64 = 2.0;
-/// Cells that may be excluded at either end of a constant-velocity interval: a drive needs up to a quarter of a second for a velocity
-/// change.
+/// Cells that may be excluded at either end of a constant-velocity interval: a drive needs up to half a second for a velocity change, half
+/// of it on either side of the jump.
 const RAMP_CELLS: [usize; 4] = [1, 3, 6, 12];
 /// Penalty of an excluded ramp in nats per cell: most drives reach their velocity within a few cells.
 const RAMP_NATS_PER_CELL: f64 = 0.5;

@@ -14,7 +14,7 @@ use super::smooth_interval::{Cells, SmoothInterval};
 use super::velocity_estimate::{SlopeBreak, VelocityJump, encoder_step, position_noise, slope_breaks};
 use stylet_stats::order_statistics::median;
 
-/// Length of a cell (s): short compared with the ramps of a drive.
+/// Length of a cell (s), about that of a block.
 const CELL_S: f64 = 0.02;
 /// Cells of each parabola in the search for a jump.
 const JUMP_SIDE_CELLS: usize = 15;

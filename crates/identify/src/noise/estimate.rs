@@ -10,7 +10,7 @@ use stylet_stats::order_statistics::{median, quantile_of_sorted};
 use stylet_stats::parallel::*;
 use stylet_stats::robust_linear_prediction::{prediction_residual, robust_linear_prediction};
 
-/// Largest number of force ranges: more of them do not improve the noise model noticeably.
+/// Largest number of force ranges.
 const MAX_FORCE_BINS: usize = 5;
 /// Smallest number of blocks per range: its standard deviation is then known to 5 %.
 const MIN_BLOCKS_PER_BIN: usize = 220;

@@ -1,6 +1,6 @@
 //! Regressors for slow drift: means over stretches further back than the autoregression (heterogeneous autoregression: Corsi 2009).
 
-/// Largest autoregressive order, in blocks of 20 ms: the time constants of filters in force sensors are shorter.
+/// Largest autoregressive order, in blocks; slower correlation is covered by the stretch means.
 pub const AR_ORDER: usize = 4;
 /// Ranges of preceding blocks whose means are regressors: up to half a second, 2.5 s and 12 s back.
 pub(super) const STRETCHES: [(usize, usize); 3] = [(AR_ORDER, 24), (24, 124), (124, 624)];

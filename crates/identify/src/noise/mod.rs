@@ -23,7 +23,7 @@ pub use whiten::WhiteningPlan;
 
 use stylet_stats::Loss;
 
-/// Huber threshold in standard deviations: beyond it the loss is linear. 2.5 keeps 97 % efficiency under normal noise.
+/// Huber threshold in standard deviations: beyond it the loss of a residual is linear.
 pub const HUBER_K: f64 = 2.5;
 /// Huber loss of a normalised residual, in nats.
 pub const HUBER_LOSS: Loss = Loss::Huber { k: HUBER_K };
