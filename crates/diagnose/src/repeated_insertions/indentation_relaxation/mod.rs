@@ -1,8 +1,7 @@
-//! Relaxation of many specimens, each indented once and held: effects missing from the base law, held-out
-//! error of the rest of the hold, and statistics of the parameters.
+//! Analyses the relaxation of many specimens, each indented once and held: effects missing from the base law, held-out error of the rest of
+//! the hold, and statistics of the parameters.
 //!
-//! Every specimen is a material of its own. A model is fitted to the ramp and the first part of the hold;
-//! the rest of the hold is held out.
+//! Every specimen is a separate material. A model is fitted to the ramp and the first part of the hold; the rest of the hold is held out.
 
 mod diagnosis;
 
@@ -22,20 +21,20 @@ use stylet_tissue::{AnyEffect, Effect, NonlinearElasticity, PronyTerm, StressRel
 
 /// Share of the hold that is fitted.
 const FITTED_HOLD_SHARE: f64 = 0.6;
-/// Smallest relative decrease of the mean error, held out or fitted, for keeping an effect ...
+/// Smallest relative decrease of the mean error, held out or fitted, for an effect to be kept.
 const MIN_RELATIVE_GAIN: f64 = 0.1;
-/// ... and smallest share of specimens that improve.
+/// Smallest share of specimens that must improve for an effect to be kept.
 const MIN_IMPROVED_SHARE: f64 = 0.75;
-/// Length of a block in s.
+/// Length of a block (s): relaxation is slow, so blocks may be longer than in insertions.
 const BLOCK_S: f64 = 0.08;
-/// Noise of a fit in multiples of the sensor noise, and its lower limit as a share of the largest force.
+/// Noise of a fit in multiples of the sensor noise, and its lower bound as a share of the largest force: both leave room for model error.
 const NOISE_FACTOR: f64 = 3.0;
 const MIN_NOISE_SHARE: f64 = 1e-3;
-/// Shortest hold (s) and smallest number of samples.
+/// Shortest hold (s) and smallest number of samples of a usable specimen.
 const MIN_HOLD_S: f64 = 3.0;
 const MIN_SAMPLES: usize = 50;
 
-/// Termination of a fit.
+/// Stopping criteria of a fit.
 const FIT_EFFORT: Effort = Effort { max_iterations: 40, min_gain_nats: 1e-3 };
 
 /// Statistics of a parameter over the specimens.
@@ -56,7 +55,7 @@ pub struct SpecimenStatistic {
 /// A candidate model in the sequence.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CandidateModel {
-    /// Added effect; `base law` first.
+    /// Name of the step: the added effect, or `base law`.
     pub step: String,
     /// Effect id.
     pub effect: Option<String>,
@@ -77,7 +76,7 @@ pub struct SpecimenReport {
     pub used: usize,
     /// Specimens that were not used, with the reason.
     pub unused: Vec<(String, String)>,
-    /// Specimens whose force drops as at a puncture.
+    /// Specimens with a force drop as at a puncture.
     pub punctured: Vec<String>,
     /// Candidate models.
     pub candidates: Vec<CandidateModel>,
@@ -85,11 +84,11 @@ pub struct SpecimenReport {
     pub parameters: Vec<SpecimenStatistic>,
 }
 
-/// Per candidate: RMS errors (N) on the fitted and the held-out part, and the model.
+/// Fits of one specimen: per candidate, RMS errors (N) on the fitted and the held-out part, and the model.
 struct SpecimenFits {
     errors: Vec<(f64, f64)>,
     models: Vec<Model>,
-    /// The same without the curvature of the spring.
+    /// The same without the nonlinear spring.
     straight: Vec<((f64, f64), Model)>,
 }
 
@@ -104,7 +103,7 @@ fn relaxation(terms: &[(f64, f64)]) -> AnyEffect {
     StressRelaxation { terms: terms.iter().map(term).collect() }.into()
 }
 
-/// Candidates, each built on the previous one, with their start values.
+/// Candidate models, each an extension of the previous one, with their start values.
 fn candidate_sequence() -> [(&'static str, Vec<AnyEffect>); 4] {
     [
         ("base law", Vec::new()),
@@ -127,7 +126,7 @@ fn candidate_sequence() -> [(&'static str, Vec<AnyEffect>); 4] {
     ]
 }
 
-/// Analyses specimens one by one.
+/// Analyses each specimen, and selects one sequence of effects for all of them.
 #[must_use]
 pub fn analyze_specimens(assumed: &Tissue, recordings: &[SegmentedRecording]) -> Option<SpecimenReport> {
     let mut unused = Vec::new();
