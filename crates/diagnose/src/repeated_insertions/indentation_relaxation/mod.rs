@@ -180,8 +180,8 @@ fn total_error(errors: (f64, f64)) -> f64 {
     errors.0 + errors.1
 }
 
-/// Whether the nonlinear spring is kept in the selected model. The ramp of a relaxing linear spring looks
-/// curved, so the test is repeated once the relaxation is modelled.
+/// Whether the nonlinear spring is kept in the selected model. The ramp of a relaxing linear spring is curved, so the test is repeated with
+/// the relaxation in the model.
 fn retest_curvature(each: &[SpecimenFits], candidates: &mut [CandidateModel], selected: usize) -> bool {
     let Some(at) = candidates.iter().position(|r| r.effect.as_deref() == Some(curvature())) else {
         return false;
@@ -203,7 +203,7 @@ fn retest_curvature(each: &[SpecimenFits], candidates: &mut [CandidateModel], se
     candidates[at].kept
 }
 
-/// Whether a recording is a ramp and a hold.
+/// Checks that a recording is a ramp and a hold; the error is the reason why not.
 fn check_ramp_and_hold(run: &SegmentedRecording) -> Result<(), String> {
     let t = &run.recording.time_s;
     let hold = t[t.len() - 1] - t[run.phases.deepest];
@@ -245,7 +245,7 @@ fn fit_specimen(assumed: &Tissue, run: &SegmentedRecording) -> Option<SpecimenFi
         let starts = if effects.is_empty() { vec![model.clone()] } else { Vec::new() };
         let with = |effect: &AnyEffect| {
             let term = EffectTerm::new(effect.info(), &effect.parameters());
-            // Two terms replace one.
+            // The candidate replaces a term of the same effect.
             let one = model.effects.iter().position(|c| c.info.id == term.info.id);
             one.map_or_else(|| model.clone(), |k| model.without_effect(k)).with_effect(term)
         };
@@ -267,7 +267,7 @@ fn fit_specimen(assumed: &Tissue, run: &SegmentedRecording) -> Option<SpecimenFi
     Some(out)
 }
 
-/// Statistics of the effect parameters of the selected model.
+/// Statistics of the effect parameters of the selected model over the specimens.
 fn parameter_statistics(each: &[SpecimenFits], candidate: usize, curved: bool) -> Vec<SpecimenStatistic> {
     let models: Vec<&Model> =
         each.iter().map(|o| if curved { &o.models[candidate] } else { &o.straight[candidate].1 }).collect();
@@ -298,7 +298,7 @@ fn parameter_statistics(each: &[SpecimenFits], candidate: usize, curved: bool) -
         .collect()
 }
 
-/// Parameter of a model by path, relaxation terms sorted by time constant.
+/// Parameter of a model by path, with relaxation terms in ascending order of their time constants.
 fn parameter_value(model: &Model, path: &str) -> Option<f64> {
     let of = |path: &str| {
         model.effects.iter().find_map(|c| {
