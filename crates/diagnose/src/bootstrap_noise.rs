@@ -12,7 +12,7 @@ use stylet_identify::noise::NoiseSource;
 use stylet_stats::linear_algebra::{SymmetricMatrix, dot};
 use stylet_stats::parallel::*;
 
-/// Number of bootstrap replicates: the variance of eight is known to a factor of 1.4.
+/// Number of bootstrap replicates: a compromise between cost and the accuracy of their variance.
 const REPLICATES: usize = 8;
 
 /// Information matrix under the noise of `data` instead of that of `matrix`.

@@ -15,7 +15,7 @@ const MAX_ERROR_RATIO: f64 = 2.0;
 pub const SIGNIFICANT_P_VALUE: f64 = 1e-3;
 /// Relative standard deviation of puncture force or friction between recordings from which one model does not describe them.
 const MAX_RELATIVE_SCATTER: f64 = 0.3;
-/// The same for the standard deviation of rupture depth and surface, in m.
+/// Standard deviation (m) of rupture depth or surface between recordings from which one model does not describe them.
 const MAX_SCATTER_M: f64 = 5e-3;
 /// Ratio to its reference above which the noise counts as too high: sensors of one type differ by less.
 const MAX_NOISE_RATIO: f64 = 5.0;

@@ -12,7 +12,7 @@ pub const EQUIVALENCE_NATS: f64 = 3.0;
 /// Largest gap between the gains of an effect and the best one at the selection step, as a share of the best gain, for the effect to be
 /// refitted as a competitor.
 const MAX_DISTANCE_SHARE: f64 = 0.05;
-/// The same in nats; the larger of both limits applies.
+/// The same gap in nats; the larger of this and `MAX_DISTANCE_SHARE` applies.
 const MAX_DISTANCE_NATS: f64 = 25.0;
 /// The fit of a competing effect stops when it cannot come within this many nats of the cause.
 const STOP_DISTANCE_NATS: f64 = 40.0;

@@ -107,7 +107,7 @@ fn start(
     Some(EffectStart::new(choice, &gain))
 }
 
-/// Range of breathing frequencies (Hz), from slow ventilation to fast breathing of small animals.
+/// Range of breathing frequencies (Hz): 3 to 72 breaths per minute.
 const BREATHING_HZ: (f64, f64) = (0.05, 1.2);
 
 /// Start values of a tissue motion on a grid of frequencies.

@@ -119,12 +119,12 @@ pub enum DiagnoseError {
         /// Scale that would correct it.
         scale: f64,
     },
-    /// The check of the recordings says that a diagnosis would mean nothing.
+    /// The check rates the recordings unusable.
     #[error(
         "a diagnosis of these recordings would mean nothing: {reasons}; look at `stylet check`; `stylet diagnose --force` goes on all the same"
     )]
     Unusable {
-        /// What stands against it.
+        /// The reasons.
         reasons: String,
     },
     /// The base law could not be fitted.
@@ -133,7 +133,7 @@ pub enum DiagnoseError {
 }
 
 impl DiagnoseError {
-    /// Whether recordings can be diagnosed all the same, although their units, signs or reach are not those of the scenario.
+    /// Whether the recordings can still be diagnosed with `force`: only their units, signs or reach differ from the scenario.
     #[must_use]
     pub fn is_implausible(&self) -> bool {
         matches!(

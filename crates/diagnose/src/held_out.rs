@@ -25,7 +25,7 @@ pub struct FreeRunResidual {
     pub rupture_times_s: Vec<f64>,
 }
 
-/// Free-run prediction of recording `r`; each predicted rupture is shifted by at most [`RUPTURE_SHIFT_SAMPLES`] to its best fit.
+/// Free-run prediction of recording `r`; each predicted rupture is shifted by at most two samples to its best fit.
 #[must_use]
 pub fn predict_free_run(model: &Model, data: &FitData, r: usize) -> Option<FreeRunResidual> {
     let mut cache = ReplayCache::new(model, data, r)?;

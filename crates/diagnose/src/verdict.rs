@@ -33,7 +33,8 @@ const MAX_STRUCTURE_P_VALUE: f64 = 1e-6;
 const MAX_UNEXPLAINED_SHARE: f64 = 0.1;
 /// Excess variance of the residual, in units of the noise variance, from which it counts as unexplained.
 const MIN_EXCESS: f64 = 0.8;
-/// The same for a single recording, in which structure is not distinguishable from slow noise.
+/// Excess variance from which the residual of a single recording counts as unexplained: its structure is not distinguishable from slow
+/// noise.
 const MIN_EXCESS_SINGLE: f64 = 3.0;
 /// Excess variance from which a residual is not noise, whatever its autocorrelation: a slow standard deviation of 2.5 times the fast one.
 const MIN_EXCESS_SLOW: f64 = 6.0;
@@ -41,7 +42,7 @@ const MIN_EXCESS_SLOW: f64 = 6.0;
 const MIN_IMITATION_SHARE: f64 = 0.02;
 /// Smallest gain (nats) of that test for an imitation: chance gives half a nat, and an inexact motion some tens.
 const MIN_IMITATION_NATS: f64 = 100.0;
-/// The same under long-memory noise.
+/// Smallest gain (nats) of the varying-coefficient test for an imitation under long-memory noise.
 const MIN_IMITATION_SLOW_NATS: f64 = 10.0;
 /// Largest relative jackknife error of a cause in the presence of an unmodelled effect.
 const MAX_RELATIVE_SE: f64 = 0.1;
@@ -49,9 +50,9 @@ const MAX_RELATIVE_SE: f64 = 0.1;
 const MIN_HELD_OUT_GAIN: f64 = 0.1;
 /// Largest gain of the varying-coefficient test of such a cause in the reweighted fit, as a share of the loss without it.
 const MAX_VARYING_SHARE: f64 = 0.001;
-/// The same in the fit with equal weights.
+/// Largest gain of that test in the fit with equal weights, as a share of the loss without the cause.
 const MAX_VARYING_SHARE_UNWEIGHTED: f64 = 0.03;
-/// The same for effects that can imitate any force of their kind.
+/// Largest gain of the varying-coefficient test, as a share of the loss, for effects that can imitate any force of their kind.
 const MAX_VARYING_SHARE_IMITATING: f64 = 0.0005;
 /// Seed of the bootstrap, constant so that equal recordings give equal results.
 const BOOTSTRAP_SEED: u64 = 1;

@@ -47,7 +47,7 @@ impl RuptureEvent {
 
 /// Relative error of the force at rupture from rounding and interpolation of the motion.
 const MIN_FORCE_SD: f64 = 1e-4;
-/// The same for the position at rupture, in m.
+/// Standard deviation (m) of the position at rupture from rounding and interpolation of the motion.
 const MIN_DEPTH_SD_M: f64 = 1.5e-6;
 /// Lower bound of the tip velocity (m/s) in the density; below it, a rupture time does not determine a depth.
 const MIN_RATE_MPS: f64 = 2e-5;
@@ -87,6 +87,7 @@ fn deviance_residual(nats: f64) -> f64 {
 /// Standard deviations of force (relative) and depth (m) at rupture.
 #[must_use]
 pub fn rupture_sds(event: &RuptureEvent, scatter: &Scatter) -> (f64, f64) {
+    /// Variance of a uniform distribution of unit width.
     const TWELFTH: f64 = 1.0 / 12.0;
     let force = event.force_excess_rate * event.sample_step_s;
     let place = event.depth_rate_mps * event.sample_step_s;
@@ -185,6 +186,7 @@ pub fn scatter_prior_nats(s: &Scatter) -> f64 {
 /// Trial values of the relative scatter of the force at rupture; spaced by about a factor of two.
 pub const FORCE_SCATTER_GRID: [f64; 13] =
     [0.0, 5e-4, 1e-3, 2e-3, 4e-3, 7e-3, 0.012, 0.02, 0.033, 0.055, 0.09, 0.15, 0.3];
+/// Trial values of the scatter of the depth at rupture in m; spaced by about a factor of two.
 const DEPTH_SCATTER_GRID_M: [f64; 12] =
     [0.0, 5e-6, 1e-5, 2e-5, 4e-5, 8e-5, 1.6e-4, 3.2e-4, 6.4e-4, 1.3e-3, 2.5e-3, 5e-3];
 

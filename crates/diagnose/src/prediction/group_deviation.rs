@@ -25,7 +25,7 @@ pub enum Refit {
 }
 
 impl Refit {
-    /// All parameters, in the order of [`Values`].
+    /// All parameters, in the order of the deviations: surface, force, friction, puncture force.
     pub const ALL: [Self; PARAMETERS] = [Self::Surface, Self::Force, Self::Friction, Self::Puncture];
 }
 
@@ -68,11 +68,11 @@ impl Factor {
 
 /// Standard deviations between needles: surface (m), logarithms of force, friction and puncture force.
 const NEEDLE_SD: Values = [0.5e-3, 0.2, 0.25, 0.25];
-/// The same between specimens or batches of tissue.
+/// Standard deviations between specimens or batches of tissue, as in [`NEEDLE_SD`].
 const TISSUE_SD: Values = [1.5e-3, 0.25, 0.2, 0.25];
-/// The same between days or set-ups.
+/// Standard deviations between days or set-ups, as in [`NEEDLE_SD`].
 const SETUP_SD: Values = [1e-3, 0.05, 0.1, 0.1];
-/// The same between recordings of one group, before any recording is known.
+/// Standard deviations between recordings of one group before any is known: surface (m), logarithms of force, friction and puncture force.
 pub const RECORDING_SD: Values = [0.2e-3, 0.03, 0.05, 0.1];
 /// Standard deviation of the exponent with which force depends on speed, for speeds without training recordings.
 pub const RATE_EXPONENT_SD: f64 = 0.1;

@@ -22,7 +22,7 @@ const SEARCH_RECORDINGS: usize = 6;
 const MIN_IMPROVEMENT: f64 = 0.02;
 /// Number of effects above which a library model needs a margin over the single stick-slip mechanism.
 const FEW_EFFECTS: usize = 2;
-/// Margin: share by which the held-out error of such a library model must be smaller.
+/// Share by which the held-out error of a library model with many effects must be smaller than that of the stick-slip model.
 const MANY_EFFECTS_MARGIN: f64 = 0.1;
 
 /// Candidate models of repeated recordings.

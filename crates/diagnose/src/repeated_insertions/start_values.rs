@@ -10,10 +10,11 @@ use stylet_tissue::{AnyEffect, DelayedPuncture, Effect, ReleaseDepth, ShaftSlip,
 
 /// Prior standard deviation (m) of the surface about the position at which the force first rises.
 const SURFACE_SD_M: f64 = 1.5e-3;
-/// The same for a blunt indenter, which first rests on soft tissue.
+/// Prior standard deviation (m) of the surface for a blunt indenter, which first rests on soft tissue.
 const INDENTATION_SURFACE_SD_M: f64 = 2e-3;
-/// Index of `rate` among the parameters of `shaft_slip`; and of `exponent` among those of `delayed_puncture`.
+/// Index of `rate` among the parameters of `shaft_slip`.
 pub(super) const SLIP_RATE_INDEX: usize = 6;
+/// Index of `exponent` among the parameters of `delayed_puncture`.
 const DELAY_EXPONENT_INDEX: usize = 2;
 /// Relative prior standard deviation of a thickness.
 const RELATIVE_THICKNESS_SD: f64 = 0.2;

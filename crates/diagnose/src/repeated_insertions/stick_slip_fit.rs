@@ -15,12 +15,11 @@ const MIN_STARTS: usize = 24;
 /// Product of the numbers of starts and recordings for small sets, whose start values are worse and whose fits are cheaper.
 const STARTS_TIMES_RECORDINGS: usize = 300;
 
-/// Fits the stick-slip model: the optimum with the smallest residual, unless another has a significantly
-/// smaller held-out error (the minimum of several held-out errors would be biased against models with a
-/// single fit).
+/// Fits the stick-slip model. Returns the optimum with the smallest residual, unless another has a significantly smaller held-out error;
+/// the minimum over all held-out errors would be biased against models with a single fit.
 ///
-/// At one speed a delayed puncture and a puncture force are equivalent: the delay must improve prediction
-/// over the simpler model from the same starts.
+/// At one speed a delayed puncture is equivalent to a puncture force, so the delay must improve prediction significantly over the simpler
+/// model from the same starts.
 #[must_use]
 pub fn fit_stick_slip(
     assumed: &Tissue,

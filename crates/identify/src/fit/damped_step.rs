@@ -8,7 +8,7 @@ use stylet_stats::linear_algebra::dot;
 /// Largest change of a rupture time in one step, in blocks; the linearization is not valid beyond.
 const MAX_RUPTURE_STEP_BLOCKS: f64 = 1.5;
 
-/// Smallest extrapolation factor that is tried; below it, the gain is not worth a further replay.
+/// Smallest extrapolation factor that is tried; a smaller one gains too little for a further replay.
 const MIN_EXTRAPOLATION: f64 = 1.3;
 /// Largest extrapolation factor, which limits the error of the parabola.
 const MAX_EXTRAPOLATION: f64 = 4.0;

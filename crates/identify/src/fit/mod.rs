@@ -71,9 +71,9 @@ impl Effort {
     pub const FULL: Self = Self { max_iterations: 14, min_gain_nats: 0.03 };
 }
 
-/// Levenberg-Marquardt damping of the first step, relative to the diagonal of the normal matrix; and damping values tried per
-/// linearization.
+/// Levenberg-Marquardt damping of the first step, relative to the diagonal of the normal matrix.
 const FIRST_DAMPING: f64 = 1e-4;
+/// Damping values tried per linearization, each eight times the previous one: up to steps of a millionth.
 const MAX_DAMPING_TRIALS: usize = 7;
 
 /// Fits a model from its current parameters.

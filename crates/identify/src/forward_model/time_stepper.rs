@@ -176,7 +176,7 @@ impl TimeStepper<'_> {
             law.step_imposed(&mut { state }, at_s, z, v_mps, layer, |s| then = s.puncture_n);
             then
         };
-        // A threshold that jumped with the velocity passed the force on the way.
+        // If the puncture force jumps with the velocity past the elastic force, the rupture is exactly at the threshold.
         if let (Some(s), Some(event)) = (strained, self.ruptures.get_mut(layer))
             && s.puncture_n.is_finite()
         {

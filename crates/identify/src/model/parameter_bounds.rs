@@ -7,7 +7,7 @@ use stylet_tissue::{FitScale, Proposal};
 const MIN_SHARE_OF_ASSUMED: f64 = 0.02;
 /// Half width of the bounds of surface and thicknesses, in tolerances.
 const MAX_TOLERANCES: f64 = 2.0;
-/// The same for thicknesses with [`FreeParameters::wide_thickness`](super::FreeParameters), in tolerances.
+/// Half width of the bounds of thicknesses with [`FreeParameters::wide_thickness`](super::FreeParameters), in tolerances.
 pub const MAX_TOLERANCES_WIDE: f64 = 5.0;
 
 /// Finite difference (N) for the size of a step of the sensor zero, in which the force is linear.

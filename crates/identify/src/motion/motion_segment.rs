@@ -11,8 +11,9 @@ use stylet_stats::linear_algebra::SymmetricMatrix;
 const HIGHEST_HZ: f64 = 3.0;
 /// Length in s of the means used in the frequency search.
 const SEARCH_MEAN_S: f64 = 0.1;
-/// Smallest and largest number of means in the frequency search, which bounds its cost.
+/// Smallest number of means in the frequency search.
 const MIN_SEARCH_MEANS: f64 = 24.0;
+/// Largest number of means in the frequency search, which bounds its cost.
 const MAX_SEARCH_MEANS: f64 = 400.0;
 /// Intervals shorter than this (s) are searched over all frequencies even if hints are given.
 const SHORT_SEGMENT_S: f64 = 6.0;

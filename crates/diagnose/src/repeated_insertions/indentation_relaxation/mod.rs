@@ -27,11 +27,13 @@ const MIN_RELATIVE_GAIN: f64 = 0.1;
 const MIN_IMPROVED_SHARE: f64 = 0.75;
 /// Length of a block (s): relaxation is slow, so blocks may be longer than in insertions.
 const BLOCK_S: f64 = 0.08;
-/// Noise of a fit in multiples of the sensor noise, and its lower bound as a share of the largest force: both leave room for model error.
+/// Noise of a fit in multiples of the sensor noise, which leaves room for model error.
 const NOISE_FACTOR: f64 = 3.0;
+/// Lower bound of the noise of a fit, as a share of the largest force.
 const MIN_NOISE_SHARE: f64 = 1e-3;
-/// Shortest hold (s) and smallest number of samples of a usable specimen.
+/// Shortest hold (s) of a usable specimen.
 const MIN_HOLD_S: f64 = 3.0;
+/// Smallest number of samples of a usable specimen.
 const MIN_SAMPLES: usize = 50;
 
 /// Stopping criteria of a fit.
