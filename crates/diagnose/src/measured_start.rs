@@ -19,8 +19,8 @@ const BETTER_FACTOR: f64 = 2.0;
 /// Searches for effects from the assumed parameters (A), from parameters found in the data (D), or from both. `None` when the model cannot
 /// be replayed.
 ///
-/// 1. Only A is searched if its base law leaves only noise, if the base law from D is within tolerance of A, or if its RMS residual is
-///    larger by [`BETTER_FACTOR`].
+/// 1. Only A is searched if its base law leaves only noise, if no layers are found in the data, if the base law from D is within
+///    tolerance of A, or if its RMS residual is larger by [`BETTER_FACTOR`].
 /// 2. D is searched first if its base law leaves only noise, if its RMS residual is smaller by [`BETTER_FACTOR`], or if it is smaller at
 ///    all and the fit from A is out of tolerance. Otherwise A is first.
 /// 3. The first search is returned if it leaves only noise and is within tolerance (A), or out of tolerance with at most one effect (D).

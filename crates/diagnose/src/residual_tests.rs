@@ -1,9 +1,9 @@
 //! Tests whether the residual of a model depends on depth, time, speed, phase, travel since reversal or acceleration.
 //!
-//! Residuals are averaged in bins of a feature; structure common to several recordings is not noise. The cross-recording statistic `T =
-//! sum_bins sum_(r<s) z_rb z_sb` has mean zero for any autocorrelation of the noise, because recordings are independent. Its variance is
-//! `sum_(r<s) sum_(b,b') C_r(b,b') C_s(b,b')`, because slow noise correlates neighbouring bins; `C_r` follows from the autocovariance of a
-//! recording's residual after subtraction of the means of the others (Bartlett 1935 for two series).
+//! Residuals are averaged in bins of a feature; structure common to several recordings is not noise. The cross-recording statistic
+//! `T = sum_bins sum_(r<s) z_rb z_sb` has mean zero for any autocorrelation of the noise, because recordings are independent.
+//! Its variance is `sum_(r<s) sum_(b,b') C_r(b,b') C_s(b,b')`, because slow noise correlates neighbouring bins; `C_r` follows from the
+//! autocovariance of a recording's residual after subtraction of the means of the others (Bartlett 1935 for two series).
 
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::Fit;

@@ -1,10 +1,10 @@
 //! Likelihood of a rupture time under the rupture condition of the model.
 //!
 //! A layer ruptures when its elastic force reaches the puncture force `F (1 + s_F n)` or the tip reaches the far interface displaced by
-//! `s_z n'`, whichever comes first, with `n, n'` standard normal: two competing risks. With `u_F = (f_K(tau)/F - 1)/s_F`, `u_z = (z(tau) -
-//! far)/s_z` and the upper tail `Q` of the normal distribution, the density of the rupture time `tau` is `phi(u_F) u_F' Q(u_z) + phi(u_z)
-//! u_z' Q(u_F)`. `s_F^2 = sigma_F^2 + (f_K' h/F)^2/12` and `s_z^2 = sigma_z^2 + (v h)^2/12` combine the scatter between recordings with the
-//! uniform timing error of a sampling interval `h`.
+//! `s_z n'`, whichever comes first, with `n, n'` standard normal: two competing risks. With the upper tail `Q` of the normal distribution,
+//! `u_F = (f_K(tau)/F - 1)/s_F` and `u_z = (z(tau) - far)/s_z`, the density of the rupture time `tau` is
+//! `phi(u_F) u_F' Q(u_z) + phi(u_z) u_z' Q(u_F)`. The standard deviations `s_F^2 = sigma_F^2 + (f_K' h/F)^2/12` and
+//! `s_z^2 = sigma_z^2 + (v h)^2/12` combine the scatter between recordings with the uniform timing error of a sampling interval `h`.
 
 use crate::model::Scatter;
 

@@ -1,8 +1,8 @@
 //! Finite acceleration of the drive at a commanded velocity jump.
 //!
-//! Where two segments of constant velocity meet, a drive with constant acceleration deviates from both lines by `dv (a/2 - |t - t0|)^2 / (2
-//! a)`, with duration `a` and intersection time `t0`. If the jump were modelled as instantaneous, the force would appear to have a lag or
-//! inertia.
+//! Where two segments of constant velocity meet, a drive with constant acceleration deviates from both lines by
+//! `dv (a/2 - |t - t0|)^2 / (2 a)`, with duration `a` and intersection time `t0`. If the jump were modelled as instantaneous, the force
+//! would appear to have a lag or inertia.
 
 use super::smooth_interval::{Cells, SmoothInterval};
 use super::velocity_estimate::VelocityJump;
