@@ -1,4 +1,4 @@
-//! Fit of the base law: force drops are assigned to layers, then parameters and rupture times are fitted in turn.
+//! Fits the base law to the recordings: assigns force drops to layers, then fits parameters and rupture times in turn.
 
 use crate::random_effect_selection::select_random_effects;
 use std::sync::Arc;
@@ -14,7 +14,7 @@ use stylet_scenario::Scenario;
 use stylet_stats::parallel::*;
 use stylet_tissue::Effect;
 
-/// Prior of a scenario: its tissue, effects and tolerances.
+/// Assumptions of a scenario: its tissue, effects and tolerances.
 #[must_use]
 pub fn assumptions_of(s: &Scenario) -> Assumptions {
     let layers = s.tissue.layers.len();
@@ -28,23 +28,23 @@ pub fn assumptions_of(s: &Scenario) -> Assumptions {
     }
 }
 
-/// Recordings in blocks, with the detected drops of their forces.
+/// Recordings in blocks, with their detected force drops and steps of the sensor zero.
 #[derive(Clone, Debug)]
 pub struct PreparedRecordings {
     /// Assumed tissue with its tolerances.
     pub assumed: Arc<Assumptions>,
     /// Blocks of each recording.
     pub blocks: Arc<Vec<BlockAverages>>,
-    /// Steps of the sensor's zero of each recording.
+    /// Steps of the sensor zero of each recording.
     pub zero_steps: Vec<Vec<ZeroStep>>,
-    /// Force drops of each recording that are no step of the zero.
+    /// Force drops of each recording, without steps of the sensor zero.
     pub drops: Vec<Vec<ForceDrop>>,
     /// Lower bound of the noise standard deviation, in N.
     pub min_noise_sd_n: f64,
 }
 
 impl PreparedRecordings {
-    /// Detects the force drops.
+    /// Detects the force drops of the recordings.
     #[must_use]
     pub fn new(assumed: Arc<Assumptions>, blocks: Vec<BlockAverages>, min_noise_sd_n: f64) -> Self {
         let drops = blocks.par_iter().map(detect_force_drops).collect();
@@ -52,7 +52,7 @@ impl PreparedRecordings {
         Self { zero_steps, assumed, blocks: Arc::new(blocks), drops, min_noise_sd_n }
     }
 
-    /// The same recordings with these steps of the zero, which are no ruptures.
+    /// The same recordings with these steps of the sensor zero, which are subtracted before force drops are detected again.
     #[must_use]
     pub fn with_zero_steps(&self, zero_steps: Vec<Vec<ZeroStep>>) -> Self {
         let without_steps = |(b, steps): (&BlockAverages, &Vec<ZeroStep>)| {
@@ -73,7 +73,7 @@ impl PreparedRecordings {
         self.drops.iter().map(|d| d.iter().map(|d| d.time_s).collect()).collect()
     }
 
-    /// Largest minus smallest force in N, which an offset does not change.
+    /// Largest minus smallest force in N, which does not depend on an offset.
     fn force_range_n(&self) -> f64 {
         let all = || self.blocks.iter().flat_map(|b| &b.force_n);
         all().fold(f64::NEG_INFINITY, |m, f| m.max(*f)) - all().fold(f64::INFINITY, |m, f| m.min(*f))
@@ -86,33 +86,34 @@ impl PreparedRecordings {
     }
 }
 
-/// A force drop this close (s) to a step of the zero is that step.
+/// Time (s) within which a force drop and a step of the sensor zero are the same event.
 pub(crate) const SAME_EVENT_S: f64 = 0.12;
-/// Noise of the first fit as a share of the largest force: large enough that details cannot trap it.
+/// Standard deviation of the noise in the first fit, as a share of the largest force: so large that small details do not create local
+/// minima.
 const FIRST_NOISE_SHARE: f64 = 0.03;
 
-/// A fit whose residual exceeds the noise of its calm parts by this factor has unexplained structure.
+/// A fit leaves unexplained structure when its RMS residual exceeds the noise of the quiet parts by this factor.
 pub(crate) const MISFIT_FACTOR: f64 = 1.2;
 /// Blocks averaged into one to rank start values.
 pub(crate) const COARSENING_FACTOR: usize = 3;
-/// The base law is refitted with random effects where a coarse refit leaves less than this share of the objective.
+/// Largest share of the objective that a coarse refit with random effects may leave for a full refit to follow.
 const MAX_OBJECTIVE_SHARE: f64 = 0.5;
 
 /// Effort of coarse fits and of the first rounds of a full one.
 const COARSE_EFFORT: Effort = Effort { max_iterations: 5, min_gain_nats: 0.3 };
 
-/// A model with its rupture times updated to the data; `times` are the force drops (s) of each recording.
+/// The model with rupture times updated to the data; `times` are the force drops (s) of each recording.
 pub(crate) fn with_updated_times(mut model: Model, data: &FitData, times: &[Vec<f64>]) -> Model {
     update_event_times(&mut model, data, times);
     model
 }
 
-/// The data with the noise estimated from the residual of a model.
+/// The data with the noise estimated from the detrended residuals of a model.
 pub(crate) fn with_noise_of(model: &Model, data: &FitData) -> Option<FitData> {
     Some(data.with_estimated_noise(&residuals(model, data)?.residual_n, NoiseSource::Detrended))
 }
 
-/// Standard deviation in N of the blocks about their neighbours.
+/// Standard deviation (N) of the block means from third differences, which vanish for a smooth force.
 pub(crate) fn roughness(blocks: &[BlockAverages]) -> f64 {
     stylet_stats::third_difference_sd(blocks.iter().map(|b| b.force_n.as_slice())).max(1e-6)
 }
@@ -125,17 +126,17 @@ pub(crate) fn random_effects_of(model: &Model) -> RandomEffects {
     (model.free.recording_surface, model.free.recording_friction)
 }
 
-/// Fits the base law; returns the fit and the data with the noise estimated from it. `None` when the model cannot be
+/// Fits the base law from the prior; returns the fit and the data with the noise estimated from it. `None` when the model cannot be
 /// replayed.
 #[must_use]
 pub fn fit_base_law(prepared: &PreparedRecordings) -> Option<(Fit, FitData)> {
     fit_from_prior(prepared, &[], (false, false))
 }
 
-/// Fits a model with effects from the prior, so that drops are assigned to layers by the model that produces them.
+/// Fits a model with effects from the prior, so that this model determines which drops belong to layers.
 ///
-/// An effect that produces drops of its own, or steps at layer boundaries, makes the base law mistake these for
-/// ruptures and move its layers; a fit that starts from there stays in that local optimum.
+/// The base law mistakes drops that an effect produces for ruptures and shifts its layers; a fit that starts from there stays in that local
+/// minimum.
 #[must_use]
 pub fn refit_from_prior(
     prepared: &PreparedRecordings,
@@ -148,7 +149,7 @@ pub fn refit_from_prior(
     fit(&with_updated_times(found.model, data, &prepared.drop_times()), data, Effort::FULL)
 }
 
-/// Short version of [`refit_from_prior`] on coarser blocks (`coarse`), to decide whether a full refit can help.
+/// As [`refit_from_prior`], on coarser blocks (`coarse`) and with fewer steps, to decide whether a full refit can help.
 #[must_use]
 pub fn coarse_refit(
     prepared: &PreparedRecordings,
@@ -161,13 +162,13 @@ pub fn coarse_refit(
     coarse.count_replayed(used.blocks_replayed());
     let mut model = found.model;
     if random_effects != (false, false) {
-        // Without fitted random effects the rupture times would move far to compensate for them.
+        // Rupture times would otherwise be shifted to compensate for the missing random effects.
         model = fit(&model, coarse, COARSE_EFFORT)?.model;
     }
     fit(&with_updated_times(model, coarse, &prepared.drop_times()), coarse, COARSE_EFFORT)
 }
 
-/// Fits the base law with these effects from the prior; returns the fit and the data with the noise estimated from it.
+/// Fits the base law with baseline effects from the prior; returns the fit and the data with the noise estimated from it.
 pub(crate) fn fit_with_baseline(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
@@ -175,8 +176,8 @@ pub(crate) fn fit_with_baseline(
     fit_from_prior(prepared, effects, (false, false))
 }
 
-/// Refits the base law with a surface position and a friction factor per recording, where that reduces the objective so
-/// much that the first fit must have mistaken differences between recordings for ruptures.
+/// Refits the base law with a surface position and a friction factor per recording. The refit is kept if it reduces the objective so
+/// strongly that the first fit must have mistaken differences between recordings for ruptures.
 #[must_use]
 pub fn refit_with_random_effects(
     prepared: &PreparedRecordings,
@@ -206,14 +207,14 @@ pub fn refit_with_random_effects(
     refitted().unwrap_or((base_fit, data))
 }
 
-/// Drops assigned to layers and parameters fitted, in turn, under a wide noise.
+/// Assigns drops to layers and fits the parameters, in turn, under a large white noise.
 fn fit_with_assigned_drops(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
     random_effects: RandomEffects,
 ) -> Option<(Fit, FitData)> {
     let rough_n = roughness(&prepared.blocks);
-    // An offset is no force of the tissue.
+    // With a baseline, the range does not contain the offset.
     let baseline = effects.iter().any(|e| e.info.baseline);
     let largest_n = if baseline { prepared.force_range_n() } else { prepared.largest_force_n() };
     let wide_noise = Noise::white(rough_n.max(FIRST_NOISE_SHARE * largest_n));
@@ -237,7 +238,7 @@ fn fit_with_assigned_drops(
     Some((best?, data))
 }
 
-/// Fit from the prior: assigned drops, then rounds of noise, rupture times and parameters.
+/// Fit from the prior: assigned drops, then rounds in which noise, rupture times and parameters are updated.
 fn fit_from_prior(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],

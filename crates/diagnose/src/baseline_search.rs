@@ -1,9 +1,8 @@
-//! The sensor's baseline before anything else: an offset, a drift, a force linear in position, steps of the zero.
+//! Fits the sensor baseline before other effects: offset, drift, force linear in position, steps of the sensor zero.
 //!
-//! These act in air too and may be larger than the tissue's force. A base law that is fitted without them assigns force
-//! drops to wrong layers and moves the surface, and a search that starts there does not return. Hence a second start: the
-//! base law with all of them, fitted from the prior, without those that do not pay for their parameters. The search runs
-//! from both starts, and the better model is kept.
+//! The baseline also acts in air and may exceed the force of the tissue. Without it, the base law assigns force drops to wrong layers and
+//! shifts the surface, and a search from there stays in that local minimum. The effect search therefore also starts from the base law with
+//! the baseline terms whose gain exceeds their BIC penalty; the better of both searches is kept.
 
 use crate::base_law_fit::{MISFIT_FACTOR, PreparedRecordings, fit_with_baseline};
 use crate::effect_selection::{Search, SearchStage};
@@ -21,17 +20,17 @@ use stylet_identify::score_test::ScoreTest;
 use stylet_stats::parallel::*;
 use stylet_tissue::{EffectInfo, Proposal};
 
-/// A baseline that reduces the residual by this factor, to the noise, is not put to question by other effects.
+/// Factor by which a baseline must reduce the RMS residual, down to the noise, for the search without it to be skipped.
 pub(crate) const DOMINANT_FACTOR: f64 = 10.0;
-/// Rounds in which further steps are looked for in the residual.
+/// Rounds in which further steps are detected in the residual.
 const RESIDUAL_ROUNDS: usize = 3;
-/// Force drops that may be steps of the zero instead of ruptures, tried one at a time.
+/// Number of force drops that are tried, one at a time, as steps of the zero instead of ruptures.
 const MAX_ALTERNATIVES: usize = 6;
-/// Rounds in which one of them changes its role.
+/// Rounds in which one force drop changes between rupture and step.
 const MAX_EXCHANGES: usize = 3;
 
-/// The search from the base law, and from the base law with a baseline where that pays; the better of both with the
-/// recordings it was fitted to.
+/// Searches for effects from the base law and, if a baseline improves it, from the base law with the baseline. Returns the search with the
+/// better penalised likelihood, and the recordings it was fitted to.
 pub(crate) fn search_with_baseline(
     prepared: &PreparedRecordings,
     base: Fit,
@@ -45,7 +44,7 @@ pub(crate) fn search_with_baseline(
         Some(baseline) if is_dominant(&baseline) => (None, baseline),
         first => {
             let from_base = Search::run(prepared, base.clone(), data.clone(), progress);
-            // Other effects leave only noise, and the baseline alone does not: no second search.
+            // No second search if other effects leave only noise and the baseline alone does not.
             let is_enough = first.is_none() && leaves_noise(&from_base.best, &from_base.data);
             let exchanged = || if is_enough { None } else { Baseline::fit(prepared, &base, &data, true) };
             let Some(baseline) = first.or_else(exchanged) else {
@@ -71,7 +70,7 @@ pub(crate) fn search_with_baseline(
     }
 }
 
-/// Recordings with their steps, fit, and data with the noise of the fit.
+/// Recordings with their steps of the zero, fit, and data with the noise of the fit.
 type Fitted = (PreparedRecordings, Fit, FitData);
 
 /// A fit of the base law with a baseline.
@@ -79,13 +78,13 @@ struct Baseline {
     prepared: PreparedRecordings,
     fit: Fit,
     data: FitData,
-    /// One step of the selection per effect.
+    /// One selection step per baseline effect.
     stages: Vec<SearchStage>,
 }
 
 impl Baseline {
-    /// The baseline of the recordings; `None` when nothing of it pays. With `exchange` a drop may also be a step instead of a rupture,
-    /// or the reverse, which takes many fits; without, it has to leave only noise.
+    /// Fits the baseline; `None` if its gain is below its penalty. With `exchange`, single force drops are tried as steps instead of
+    /// ruptures and the reverse, which takes many fits; without, the baseline must leave only noise.
     fn fit(prepared: &PreparedRecordings, base: &Fit, data: &FitData, exchange: bool) -> Option<Self> {
         let infos: Vec<&'static EffectInfo> =
             base.model.assumed.candidates().filter(|i| i.baseline).collect();
@@ -110,7 +109,7 @@ impl Baseline {
             let penalty = (count(&other.1) - count(&best.1)) * bic_penalty(1, blocks);
             likelihood_gain(&best.1, &other.1, &other.2).value() - penalty
         };
-        // As long as more than noise is left, a drop may be a step instead of a rupture, or the reverse.
+        // While structure is left, a drop is tried as a step instead of a rupture, or the reverse.
         let exchanged = |mut best: Fitted| {
             for _ in 0..MAX_EXCHANGES {
                 if !exchange || leaves_noise(&best.1, &best.2) {
@@ -133,7 +132,7 @@ impl Baseline {
         };
         let mut best = exchanged(fitted(candidates.steps.clone())?);
         if exchange && !leaves_noise(&best.1, &best.2) {
-            // Many steps: all drops that no layer takes.
+            // For many steps at once: all drops that are not assigned to a layer.
             let known = |drop: &&(usize, ZeroStep)| best.0.zero_steps[drop.0].contains(&drop.1);
             let more = unassigned(&candidates.drops, &best.1).filter(|drop| !known(drop));
             let steps = more.fold(best.0.zero_steps.clone(), |steps, drop| toggled(&steps, *drop));
@@ -168,7 +167,7 @@ impl Baseline {
     }
 }
 
-/// Whether the first-order gain of some baseline effect pays for its parameters.
+/// Whether the first-order gain of any baseline effect exceeds its penalty.
 fn may_pay(infos: &[&'static EffectInfo], base: &Fit, data: &FitData) -> bool {
     let score_test = ScoreTest::new(base, data);
     let offset_needed = bic_penalty(1, data.compared_block_count()) + MIN_GAIN_NATS;
@@ -197,8 +196,7 @@ pub(crate) fn leaves_noise(f: &Fit, data: &FitData) -> bool {
 }
 
 impl Search {
-    /// Removes baseline effects and steps whose loss is smaller than their penalty; returns one selection step per
-    /// remaining effect.
+    /// Removes baseline effects and steps whose gain is below their penalty; returns one selection step per remaining effect.
     fn prune_baseline(&mut self) -> Vec<SearchStage> {
         loop {
             remove_weak_steps(self, NoiseSource::Residual);

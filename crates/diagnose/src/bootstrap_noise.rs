@@ -1,9 +1,8 @@
-//! Uncertainty of the estimated noise, by a parametric bootstrap.
+//! Propagates the uncertainty of the estimated noise into the information matrix, by a parametric bootstrap.
 //!
-//! Fitted parameters absorb a part of slow noise, so that the residual understates it; and noise with a time constant
-//! of ten seconds is estimated from a few dozen independent segments. Noise is therefore simulated as estimated, the
-//! same parameters are fitted to it, and the noise is estimated again from the residual (Efron and Tibshirani 1993,
-//! chapter 6).
+//! Fitted parameters absorb part of the slow noise, so the residual underestimates it; and noise with a time constant of ten seconds is
+//! estimated from a few dozen independent segments. Each replicate simulates noise from its estimate, projects out the fitted parameters,
+//! and estimates the noise again from the residual (Efron and Tibshirani 1993, chapter 6).
 
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -13,10 +12,10 @@ use stylet_identify::noise::NoiseSource;
 use stylet_stats::linear_algebra::{SymmetricMatrix, dot};
 use stylet_stats::parallel::*;
 
-/// Bootstrap replicates.
+/// Number of bootstrap replicates: a compromise between cost and the accuracy of their variance.
 const REPLICATES: usize = 8;
 
-/// The information matrix under another noise.
+/// Information matrix under the noise of `data` instead of that of `matrix`.
 fn under_noise(columns: &[RecordingColumn], matrix: &SymmetricMatrix, data: &FitData) -> SymmetricMatrix {
     let now: Vec<Vec<f64>> = columns.iter().map(|c| data.whiten(c.recording, &c.e)).collect();
     let mut changed = matrix.clone();
@@ -28,7 +27,7 @@ fn under_noise(columns: &[RecordingColumn], matrix: &SymmetricMatrix, data: &Fit
     changed
 }
 
-/// Information matrices under bootstrap estimates of the noise; `matrix` is that under the noise of `data`.
+/// Information matrices under bootstrap estimates of the noise; `matrix` is the one under the noise of `data`.
 #[must_use]
 pub fn bootstrap_noise(
     tangent: &Linearization,
@@ -72,7 +71,7 @@ struct RecordingColumn {
     e: Vec<f64>,
 }
 
-/// Columns of the tangent by recording.
+/// Non-zero Jacobian columns of each recording.
 fn recording_columns(tangent: &Linearization, data: &FitData) -> Vec<RecordingColumn> {
     let shared = tangent.shared.len();
     let mut out = Vec::new();

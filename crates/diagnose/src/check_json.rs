@@ -1,9 +1,9 @@
-//! Items of a check of recordings, in `check.json` and `diagnosis.json`.
+//! Items of the check of recordings, in `check.json` and `diagnosis.json`.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How far recordings serve.
+/// Suitability of recordings for a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Light {
@@ -11,12 +11,12 @@ pub enum Light {
     Good,
     /// A diagnosis will be limited.
     Limited,
-    /// A diagnosis would mean nothing.
+    /// A diagnosis would not be meaningful.
     Unusable,
 }
 
 impl Light {
-    /// As the command and its report print it.
+    /// Name as printed by the command and the report.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -27,12 +27,12 @@ impl Light {
     }
 }
 
-/// One aspect of an experiment.
+/// Result of the check of one aspect of an experiment.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CheckItem {
-    /// What was checked: `recordings`, `contact`, `motion`, `depth`, `parameters` or `effects`.
+    /// Aspect: `recordings`, `contact`, `motion`, `depth`, `parameters` or `effects`.
     pub topic: String,
-    /// How far the recordings serve.
+    /// Suitability of the recordings in this aspect.
     pub light: Light,
     /// The reason, in one sentence.
     pub message: String,
@@ -44,17 +44,17 @@ impl CheckItem {
     }
 }
 
-/// From which size on an effect would be seen.
+/// Size from which an effect is detectable in the recordings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct EffectVisibility {
     /// Effect id.
     pub effect: String,
-    /// Whether its typical size would be seen.
+    /// Whether an effect of typical size would be detected.
     pub visible: bool,
-    /// Nats that its typical size would gain.
+    /// Expected gain (nats) of an effect of typical size.
     pub nats: f64,
-    /// Parameters at the smallest size that would be seen; `None` when no plausible size would.
+    /// Parameters at the smallest detectable size; `None` when no plausible size is detectable.
     pub smallest: Option<BTreeMap<String, f64>>,
-    /// Parameters at the size below which it would be missed; `None` when at every plausible size.
+    /// Parameters at the size below which the effect would be missed; `None` when it would be missed at every plausible size.
     pub hidden_below: Option<BTreeMap<String, f64>>,
 }

@@ -1,8 +1,7 @@
-//! What the data support: one rule for agreement, verdict and confidence.
+//! Derives agreement, verdict and confidence of a diagnosis from its numbers by one rule.
 //!
-//! The rule reads a finished diagnosis: the errors of held-out predictions, the noise, the residual tests, the bounds of the
-//! parameters and the scatter between recordings. Whatever it finds stands in [`Diagnosis::findings`], so that no sentence
-//! contradicts a number beside it.
+//! Input: a finished diagnosis with held-out errors, noise, residual tests, parameters at bounds and scatter between recordings. Output:
+//! [`Diagnosis::findings`], and agreement, verdict and confidences that do not contradict them.
 
 use crate::check_json::Light;
 use crate::diagnosis_json::{BaseParameter, Diagnosis, Finding, FindingKind, Gain, Verdict};
@@ -10,28 +9,27 @@ use stylet_record::{QualityKind, Recording};
 use stylet_scenario::Scenario;
 use stylet_stats::number_format::{p_value, significant};
 
-/// Predictions that miss by more than this factor above the noise, with the scatter between recordings known, contradict the
-/// model.
+/// Ratio of the prediction error (given the scatter between recordings) to the noise above which predictions contradict the model.
 const MAX_ERROR_RATIO: f64 = 2.0;
-/// The residual depends on a feature below this p-value.
+/// p-value below which the residual depends on a feature.
 pub const SIGNIFICANT_P_VALUE: f64 = 1e-3;
-/// Scatter between recordings that no single model describes: standard deviation of puncture force or friction, relative.
+/// Relative standard deviation of puncture force or friction between recordings from which one model does not describe them.
 const MAX_RELATIVE_SCATTER: f64 = 0.3;
-/// The same for rupture depth and surface, in m.
+/// Standard deviation (m) of rupture depth or surface between recordings from which one model does not describe them.
 const MAX_SCATTER_M: f64 = 5e-3;
-/// The noise is far above its reference from this factor on: sensors of one kind differ by less.
+/// Ratio to its reference above which the noise counts as too high: sensors of one type differ by less.
 const MAX_NOISE_RATIO: f64 = 5.0;
-/// Largest confidence of a cause beside a finding that contradicts the model.
+/// Largest confidence of a cause together with a finding that contradicts the model.
 pub const MAX_CONFIDENCE_CONTRADICTED: f64 = 0.8;
-/// Largest confidence of a cause from one recording, which no prediction confirmed, or from recordings of one motion, under
-/// which causes that depend on time, depth or speed may look the same.
+/// Largest confidence of a cause from one recording, which no prediction confirms, or from recordings of one motion, in which effects of
+/// time, depth or speed can coincide.
 const MAX_CONFIDENCE_FEW: f64 = 0.9;
-/// Recordings have the same motion when their positions differ by at most this share of the travel (RMS).
+/// Largest RMS difference of the positions of recordings with the same motion, as a share of the travel.
 const SAME_MOTION_SHARE: f64 = 0.01;
-/// Positions that are compared.
+/// Number of positions compared.
 const MOTION_POINTS: usize = 200;
 
-/// What the rule needs besides the diagnosis.
+/// Input of the rule in addition to the diagnosis.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Context {
     /// Whether all of several recordings have the same motion.
@@ -40,11 +38,11 @@ pub(crate) struct Context {
     pub sensor_noise_n: Option<f64>,
     /// Noise of the samples in air in N.
     pub air_noise_n: Option<f64>,
-    /// Resolution of the recorded force in N: an error of this size is no misfit.
+    /// Resolution of the recorded force in N; errors of this size are not a misfit.
     pub resolution_n: f64,
 }
 
-/// Adds the findings to a diagnosis, and sets agreement, verdict and confidences accordingly.
+/// Adds the findings to a diagnosis, and sets agreement, verdict and confidences from them.
 pub(crate) fn apply(d: &mut Diagnosis, context: &Context) {
     d.findings = findings(d, context);
     if d.verdict == Verdict::None && d.base_parameters.iter().any(|b| b.out_of_tolerance) {
@@ -130,7 +128,7 @@ fn findings(d: &Diagnosis, context: &Context) -> Vec<Finding> {
     out
 }
 
-/// Predictions that miss by more than noise and scatter between recordings explain.
+/// Finding: prediction errors above noise and scatter between recordings.
 fn prediction_error(g: &Gain, resolution_n: f64) -> Option<String> {
     let floor_n = g.floor_n.max(resolution_n);
     let misfit_n = g.misfit_n();
@@ -153,7 +151,7 @@ fn parameters_at_bound(d: &Diagnosis) -> Vec<String> {
     base.chain(of_causes).collect()
 }
 
-/// Compares the parameters with the scenario's, whatever the fit started from.
+/// Compares the fitted parameters with the scenario's values and tolerances, even if the fit started from others.
 pub(crate) fn compare_with_scenario(parameters: &mut [BaseParameter], scenario: &Scenario) {
     for b in parameters {
         let layer = b.layer.checked_sub(1).and_then(|l| scenario.tissue.layers.get(l));
@@ -176,7 +174,7 @@ pub(crate) fn compare_with_scenario(parameters: &mut [BaseParameter], scenario: 
     }
 }
 
-/// A parameter outside its tolerance, in words.
+/// Message for a parameter outside its tolerance.
 fn out_of_tolerance(b: &BaseParameter) -> String {
     let (scale, unit) = match b.name.as_str() {
         "stiffness_n_per_m" => (1.0, "N/m"),
@@ -213,7 +211,7 @@ pub fn parameter_name(b: &BaseParameter) -> String {
     if b.layer == 0 { b.name.clone() } else { format!("{} of layer {}", b.name, b.layer) }
 }
 
-/// Scatter between recordings that one model does not describe.
+/// Finding: scatter between recordings that one model does not describe.
 fn scatter(d: &Diagnosis) -> Option<String> {
     let s = &d.random_effect_sd;
     let mut what = Vec::new();
@@ -232,7 +230,7 @@ fn scatter(d: &Diagnosis) -> Option<String> {
     })
 }
 
-/// A noise estimate far above that of the sensor or that in air.
+/// Finding: noise far above that of the sensor or that in air.
 fn noise_level(noise_n: f64, context: &Context) -> Option<String> {
     let references =
         [(context.sensor_noise_n, "that of the scenario's sensor"), (context.air_noise_n, "that in air")];

@@ -1,4 +1,4 @@
-//! Effects that compete with an identified cause, and the equivalence class that the data cannot resolve.
+//! Finds effects that compete with each identified cause, and those that the data cannot distinguish from it.
 
 use crate::model_comparison::{bic_penalty, likelihood_gain};
 use crate::model_pruning::{effect_at_bound, required_gain_nats};
@@ -7,14 +7,14 @@ use stylet_identify::fit::{Effort, Fit, fit_if_below};
 use stylet_identify::model::EffectTerm;
 use stylet_stats::parallel::*;
 
-/// Effects within this many nats of the best are equivalent.
+/// Largest difference (nats) of effects that count as equivalent.
 pub const EQUIVALENCE_NATS: f64 = 3.0;
-/// An effect competes when its gain at the selection step was behind the best by at most this share of it, or by at
-/// most `MAX_DISTANCE_NATS`.
+/// Largest gap between the gains of an effect and the best one at the selection step, as a share of the best gain, for the effect to be
+/// refitted as a competitor.
 const MAX_DISTANCE_SHARE: f64 = 0.05;
-/// See `MAX_DISTANCE_SHARE`; in nats.
+/// The same gap in nats; the larger of this and `MAX_DISTANCE_SHARE` applies.
 const MAX_DISTANCE_NATS: f64 = 25.0;
-/// The fit of a competing effect stops when it cannot come closer than this many nats.
+/// The fit of a competing effect stops when it cannot come within this many nats of the cause.
 const STOP_DISTANCE_NATS: f64 = 40.0;
 
 /// An effect that competes with a cause.
@@ -22,13 +22,13 @@ const STOP_DISTANCE_NATS: f64 = 40.0;
 pub struct CompetingEffect {
     /// Identifier of the effect.
     pub name: &'static str,
-    /// Nats behind the cause, parameter penalties included (negative: ahead).
+    /// Penalised log likelihood (nats) by which it is worse than the cause; negative if it is better.
     pub nats_behind: f64,
     /// The effect with its fitted values.
     pub choice: EffectTerm,
 }
 
-/// Competing effects of every cause of the best model; one that is ahead replaces the cause.
+/// Competing effects of every cause of the best model. A competitor that is better replaces the cause.
 pub fn find_competing_effects(search: &mut Search) -> Vec<Vec<CompetingEffect>> {
     let mut k = 0;
     let mut out: Vec<Vec<CompetingEffect>> = Vec::new();
@@ -36,7 +36,7 @@ pub fn find_competing_effects(search: &mut Search) -> Vec<Vec<CompetingEffect>> 
     while k < search.best.model.effects.len() {
         let fits = competing_fits(search, k);
         let ahead = fits.iter().filter(|r| r.1 < -0.5).min_by(|a, b| a.1.total_cmp(&b.1));
-        // A model with more parameters must also be better under its own noise.
+        // A model with more parameters must also be better under the noise estimated from its own residuals.
         let justified = |f: &Fit| {
             f.model.effect_parameter_count() <= search.best.model.effect_parameter_count()
                 || (!effect_at_bound(f, k)
@@ -64,7 +64,7 @@ pub fn find_competing_effects(search: &mut Search) -> Vec<Vec<CompetingEffect>> 
     out
 }
 
-/// Fits of the effects that compete with effect `k`, and the nats they are behind.
+/// Fits with effect `k` replaced by a competitor, and the nats by which each is worse.
 fn competing_fits(search: &Search, k: usize) -> Vec<(Fit, f64)> {
     let model = &search.best.model;
     let cause = &model.effects[k];
@@ -77,7 +77,7 @@ fn competing_fits(search: &Search, k: usize) -> Vec<(Fit, f64)> {
         .zip(&stage.candidates)
         .filter(|(c, r)| {
             let close = best - r.1 < (MAX_DISTANCE_SHARE * best).max(MAX_DISTANCE_NATS);
-            // A special case may have fallen behind only because of effects that were selected later.
+            // A special case of the cause is refitted too: effects selected later can make it sufficient.
             let special = c.info.nested_in.contains(&cause.info.id);
             (close || special) && model.effects.iter().all(|e| e.info.id != c.info.id)
         })
@@ -95,7 +95,7 @@ fn competing_fits(search: &Search, k: usize) -> Vec<(Fit, f64)> {
                 cause_nats + STOP_DISTANCE_NATS - bic_penalty(other.effect_parameter_count(), blocks);
             let f = fit_if_below(&other, &search.data, Effort::FULL, wanted)?;
             let behind = penalised(&f) - cause_nats;
-            // An effect that includes the cause as a special case must earn its additional parameters.
+            // The gain of an effect that includes the cause as a special case must exceed its additional penalty.
             let nested = cause.info.nested_in.contains(&f.model.effects[k].info.id);
             (!nested || behind < -0.5).then_some((f, behind))
         })

@@ -1,12 +1,12 @@
-//! Confidence intervals from the curvature of the objective, with rupture times marginalised.
+//! Confidence intervals from the curvature of the objective (Laplace approximation), with rupture times marginalised.
 //!
-//! Where recordings have random effects, a shared parameter is a mean of few values, and their variance is estimated
-//! from the same values: variances use the remaining degrees of freedom (restricted likelihood, Patterson and Thompson
-//! 1971), and intervals are Student's with the degrees of freedom of Satterthwaite (1946), `nu = V^2 /
-//! sum(V_k^2/nu_k)`, where `V_k` is the part of the variance `V` due to random effect `k`.
+//! Under random effects, a shared parameter is a mean over few recordings, whose variance is estimated from the same recordings. Variances
+//! therefore use the remaining degrees of freedom (restricted likelihood, Patterson and Thompson 1971), and intervals are Student's t with
+//! the degrees of freedom of Satterthwaite (1946), `nu = V^2 / sum(V_k^2/nu_k)`, where `V_k` is the part of the variance `V` due to random
+//! effect `k`.
 //!
-//! The noise is that of the whole residual, its slow part included; a bootstrap (`bootstrap_noise`) restores what the
-//! fitted parameters absorb. Derivatives with respect to layer boundaries use a step as large as their uncertainty.
+//! The noise model includes the slow part of the residual; a bootstrap (`bootstrap_noise`) corrects for what the fitted parameters absorb.
+//! Derivatives with respect to layer boundaries use a step as large as their uncertainty.
 
 use crate::bootstrap_noise::bootstrap_noise;
 use crate::diagnosis_json::Estimate;
@@ -21,33 +21,33 @@ use stylet_tissue::{FitScale, ParameterInfo, Proposal};
 
 /// Cumulative probability at the upper end of a 95 % interval.
 const UPPER_PROBABILITY: f64 = 0.975;
-/// Factor on all half widths, calibrated on 400 simulated cases with one effect (seed 1001): the noise model is an
-/// autoregression of block means, and the effects were selected on the same data.
+/// Calibration factor on all half widths from 400 simulated cases with one effect (seed 1001). It covers the approximation of the noise by
+/// an autoregression of block means, and the selection of effects on the same data.
 const CALIBRATION_FACTOR: f64 = 1.1;
-/// Upper end of an interval without one.
+/// Number that represents an infinite upper end in JSON.
 const UNBOUNDED: f64 = 1e300;
-/// Relative increase of a variance to determine its contribution.
+/// Relative increase of the variance of a random effect, to determine its contribution by a finite difference.
 const VARIANCE_INCREASE: f64 = 0.02;
-/// Upper limit of updates of the step for layer boundaries.
+/// Largest number of updates of the step for layer boundaries.
 const MAX_STEP_UPDATES: usize = 4;
-/// The step for layer boundaries has converged when it changes by less than this share.
+/// Relative change of the step for layer boundaries below which it has converged.
 const STEP_TOLERANCE: f64 = 0.1;
 /// Degrees of freedom that count as infinite.
 const INFINITE_FREEDOM: f64 = 1e4;
 
-/// Covariance of the parameters at an optimum.
+/// Covariance of the fitted parameters at an optimum.
 pub struct Covariance<'a> {
     pub(crate) fit: &'a Fit,
     pub(crate) tangent: Linearization,
     matrix: SymmetricMatrix,
     pub(crate) factor: CholeskyFactor,
-    /// The same with one variance of a random effect increased, and its degrees of freedom.
+    /// Factors with one random-effect variance increased, and the degrees of freedom of that variance.
     with_increased_variance: Vec<(CholeskyFactor, f64)>,
     /// Factors under bootstrap estimates of the noise.
     bootstrap: Vec<CholeskyFactor>,
 }
 
-/// A random effect.
+/// The random effects with estimated variances.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum RandomEffect {
     Surface,
@@ -57,7 +57,7 @@ enum RandomEffect {
 }
 
 impl<'a> Covariance<'a> {
-    /// Covariance with the uncertainty of the estimated noise.
+    /// Covariance including the uncertainty of the estimated noise.
     #[must_use]
     pub fn new(fit: &'a Fit, data: &FitData, rng: &mut impl Rng) -> Self {
         let mut covariance = Self::with_known_noise(fit, data);
@@ -68,7 +68,7 @@ impl<'a> Covariance<'a> {
         covariance
     }
 
-    /// Covariance with known noise.
+    /// Covariance under known noise.
     pub(crate) fn with_known_noise(fit: &'a Fit, data: &FitData) -> Self {
         let mut tangent = Linearization::new(&fit.model, data, &fit.residuals);
         let mut wide_m = 0.0;
@@ -78,7 +78,7 @@ impl<'a> Covariance<'a> {
                 break;
             }
             wide_m = next_m;
-            // One step for all boundaries: parameters that move a boundary in opposite directions must cancel.
+            // One step for all boundaries, so that parameters that move a boundary in opposite directions cancel.
             let step = |n: &Parameter| {
                 moves_a_kink(n.role, &fit.model).then_some(wide_m.min(0.25 * (n.high - n.low)))
             };
@@ -93,7 +93,7 @@ impl<'a> Covariance<'a> {
         .into_iter()
         .filter_map(|kind| degrees_of_freedom(kind, fit).map(|(count, freedom)| (kind, count, freedom)))
         .collect();
-        // Variances scaled to their degrees of freedom.
+        // Scales the variances to their degrees of freedom.
         let mut matrix = tangent.normal_matrix.clone();
         for (kind, count, freedom) in &estimated {
             scale_variance(&mut matrix, &tangent, fit, *kind, (1.0, count / freedom));
@@ -144,8 +144,8 @@ impl<'a> Covariance<'a> {
         (all.sqrt(), freedom.clamp(1.0, INFINITE_FREEDOM))
     }
 
-    /// Nats against zero strength of an effect: half the square of the normal deviate with the same tail as Student's,
-    /// the largest over its strengths. `None` where no strength can be zero in the scale of the fit.
+    /// Evidence (nats) against zero strength of an effect: half the squared normal deviate with the same tail probability as Student's t,
+    /// the largest over its strengths. `None` if no strength can be zero in the scale of the fit.
     #[must_use]
     pub fn nats_against_zero(&self, effect: usize) -> Option<f64> {
         let choice = &self.fit.model.effects[effect];
@@ -153,7 +153,7 @@ impl<'a> Covariance<'a> {
         let nats = strengths.filter(|(_, (p, _))| p.strength).filter_map(|(k, (p, value))| {
             let off = match p.fit_scale() {
                 FitScale::Linear => value - p.inactive,
-                // Deviations of the reciprocal, to first order.
+                // For the deviation of the reciprocal, to first order.
                 FitScale::Reciprocal => *value,
                 FitScale::Log => return None,
             };
@@ -198,15 +198,15 @@ impl<'a> Covariance<'a> {
         Some((self.fit.model.get(role, 0), if half > 0.0 { half } else { by_prior() }))
     }
 
-    /// Upper end of the prior for a puncture force that no recording bounds from above, in the scale of the fit.
+    /// Upper end of the 95 % interval of the prior (scale of the fit) for a puncture force that the data do not bound from above; `None`
+    /// otherwise.
     #[must_use]
     pub fn prior_upper_end(&self, role: ParameterRole) -> Option<f64> {
         let n = self.tangent.shared.iter().find(|n| n.role == role)?;
         is_open_above(self.fit, n).then(|| n.prior_mean + n.prior_sd * normal::quantile(UPPER_PROBABILITY))
     }
 
-    /// Largest elastic force (N) that a layer reached in any recording, less what the scatter of its puncture force may
-    /// explain.
+    /// Largest elastic force (N) of a layer in any recording, reduced by the 95 % range of the scatter of its puncture force.
     #[must_use]
     pub fn reached_force_n(&self, layer: usize) -> f64 {
         let events = self.fit.residuals.ruptures.iter().filter_map(|e| e.get(layer));
@@ -215,7 +215,7 @@ impl<'a> Covariance<'a> {
         reached_n * (1.0 - normal::quantile(UPPER_PROBABILITY) * scatter).max(0.0)
     }
 
-    /// Paths of the parameters of an effect that stand at a bound of the search.
+    /// Paths of the parameters of an effect that are at a bound of the search.
     #[must_use]
     pub fn effect_bounds(&self, effect: usize) -> Vec<String> {
         let choice = &self.fit.model.effects[effect];
@@ -227,7 +227,7 @@ impl<'a> Covariance<'a> {
         parameters.filter(at_bound).map(|(_, (p, _))| p.path.to_owned()).collect()
     }
 
-    /// Whether a shared parameter stands at a bound.
+    /// Whether a shared parameter is at a bound.
     #[must_use]
     pub fn at_bound(&self, role: ParameterRole) -> bool {
         self.tangent.shared.iter().find(|n| n.role == role).is_some_and(|n| {
@@ -237,7 +237,7 @@ impl<'a> Covariance<'a> {
         })
     }
 
-    /// A parameter of an effect with its interval.
+    /// Estimate of an effect parameter with its 95 % interval.
     #[must_use]
     pub fn effect_parameter(&self, effect: usize, parameter: usize) -> Estimate {
         let choice = &self.fit.model.effects[effect];
@@ -247,7 +247,7 @@ impl<'a> Covariance<'a> {
             return Estimate { value, low: value, high: value };
         }
         if value == f64::INFINITY {
-            // Practically rigid: only the reciprocal is determined.
+            // Rigid limit: only the reciprocal is determined.
             let (x, half) =
                 self.shared_parameter(ParameterRole::Effect { effect, parameter }).unwrap_or_default();
             let low = (1.0 / (x + half)).min(UNBOUNDED).max(p.low);
@@ -257,7 +257,7 @@ impl<'a> Covariance<'a> {
         let (low, high) = match p.fit_scale() {
             FitScale::Log => (value * libm::exp(-half / value), value * libm::exp(half / value)),
             FitScale::Reciprocal => {
-                // Symmetric in the reciprocal.
+                // The interval is symmetric in the reciprocal.
                 let (x, half) = (1.0 / value, half / (value * value));
                 (1.0 / (x + half), if x > half { 1.0 / (x - half) } else { f64::INFINITY })
             }
@@ -267,12 +267,12 @@ impl<'a> Covariance<'a> {
     }
 }
 
-/// Loss in nats at the end of a 95 % interval.
+/// Decrease of the log likelihood (nats) at the end of a 95 % interval.
 pub(crate) fn interval_end_nats() -> f64 {
     0.5 * normal::quantile(UPPER_PROBABILITY).powi(2)
 }
 
-/// Whether the data leave a puncture force open above: every recording reached it only at the end of its layer.
+/// Whether the data do not bound a puncture force from above, because every recording reached it only at the end of its layer.
 fn is_open_above(fit: &Fit, n: &Parameter) -> bool {
     let ParameterRole::Puncture(layer) = n.role else { return false };
     let scatter = &fit.model.scatter;
@@ -286,8 +286,8 @@ fn is_open_above(fit: &Fit, n: &Parameter) -> bool {
     fit.residuals.ruptures.iter().filter_map(|e| e.get(layer)).map(loss).sum::<f64>() < interval_end_nats()
 }
 
-/// A fit in which puncture forces that no recording bounds from above are set to their prior, so that they do not
-/// constrain stiffness and relaxation.
+/// Sets puncture forces that the data do not bound from above to their prior mean and refits, so that they do not constrain stiffness and
+/// relaxation; the fit is unchanged if that increases the objective too much.
 #[must_use]
 pub fn release_unreached_punctures(fit: Fit, data: &FitData) -> Fit {
     let below = |n: &Parameter| n.prior_mean > fit.model.get(n.role, 0) && is_open_above(&fit, n);
@@ -301,7 +301,7 @@ pub fn release_unreached_punctures(fit: Fit, data: &FitData) -> Fit {
     free.filter(|f| f.nats() < fit.nats() + interval_end_nats()).unwrap_or(fit)
 }
 
-/// Median standard deviation in m of the boundaries at which the force has a kink.
+/// Median standard deviation (m) of the parameters that move a kink of the force.
 fn boundary_sd_m(tangent: &Linearization, model: &Model) -> Option<f64> {
     let variances = tangent.factor().inverse_diagonal();
     let with_kink =
@@ -323,12 +323,12 @@ fn moves_a_kink(role: ParameterRole, model: &Model) -> bool {
     }
 }
 
-/// Number of values that determine the variance of a random effect, and the remaining degrees of freedom; `None`
-/// without this random effect.
+/// Number of values that determine the variance of a random effect, and the remaining degrees of freedom; `None` if the model does not
+/// contain it.
 fn degrees_of_freedom(random_effect: RandomEffect, fit: &Fit) -> Option<(f64, f64)> {
     let model = &fit.model;
     let recordings = model.per_recording.len() as f64;
-    // Effective number of ruptures per layer that determine this variance.
+    // Effective number of ruptures per layer for this variance.
     let estimated = |risk: usize| -> Vec<f64> {
         (0..model.layers())
             .map(|l| {
@@ -354,7 +354,7 @@ fn degrees_of_freedom(random_effect: RandomEffect, fit: &Fit) -> Option<(f64, f6
     (count > 0.0).then(|| (count, (count - fitted).clamp(1.0_f64.min(count), count)))
 }
 
-/// Changes the information matrix from a variance of `from` times the fitted one to `to` times.
+/// Updates the information matrix for a change of a random-effect variance from `from` to `to` times the fitted one.
 fn scale_variance(
     matrix: &mut SymmetricMatrix,
     tangent: &Linearization,

@@ -1,5 +1,4 @@
-//! Diagnosis of recordings: which effects the scenario lacks, with intervals, and the improvement on held-out
-//! recordings.
+//! Diagnoses recordings: identifies the effects that the scenario lacks, with intervals and the improvement on held-out recordings.
 
 use crate::base_law_fit::{PreparedRecordings, assumptions_of};
 use crate::check_json::{CheckItem, Light};
@@ -42,13 +41,13 @@ use stylet_tissue::Effect;
 pub struct Options {
     /// Skips the check of the recordings, held-out errors and identifiability.
     pub brief: bool,
-    /// Diagnoses recordings although their check says that it would mean nothing.
+    /// Diagnoses recordings although their check rates them unusable.
     pub force: bool,
 }
 
 /// A diagnosis with the data for its report.
 pub struct DiagnosisResult {
-    /// The result.
+    /// The result, as written to `diagnosis.json`.
     pub diagnosis: Diagnosis,
     /// The scenario with fitted parameters and the identified effects.
     pub extended_scenario: Scenario,
@@ -62,10 +61,10 @@ pub struct DiagnosisResult {
     pub extended_held_out: Vec<Option<FreeRunResidual>>,
 }
 
-/// Why an effect is negligible in the presence of an unmodelled one.
+/// Reason why an effect is negligible in the presence of an unmodelled one.
 pub const REASON_IMITATES_UNMODELLED: &str = "may imitate an effect that the library does not contain";
 
-/// Compares recordings with the prediction of a scenario that has as many layers as the tissue.
+/// Diagnoses recordings with a scenario that has as many layers as the tissue.
 pub(crate) fn diagnose_given_layers(
     scenario: &Scenario,
     recordings: &[NamedRecording],
@@ -109,7 +108,7 @@ pub(crate) fn diagnose_given_layers(
     let mut competing = find_competing_effects(&mut search);
     progress("assessing the residual");
     let mut assessment = assess_search(&mut search, &competing);
-    // With a coarse force resolution the residual may be quantisation.
+    // With a coarse force resolution the residual may be quantisation error.
     assessment.unknown &= !raw.step_n.is_some_and(|s| s > 0.5 * sample_noise_sd_n(&search.data));
     let mut unweighted: Vec<(&str, JackknifeResult)> = Vec::new();
     if assessment.unknown && recordings.len() > 1 {
@@ -184,8 +183,7 @@ pub(crate) fn diagnose_given_layers(
     }
     mark_mains(&mut causes, &search);
     let has_cause = has_cause(&search, &causes);
-    // Without an identified effect the base law is the final model, unless the best model predicts better in the presence of
-    // an unmodelled force.
+    // Without an identified effect the base law is the final model, unless the best model predicts better despite an unmodelled force.
     let partial = if assessment.unknown {
         partial_model(&search, &base_held_out, &extended_held_out, noise_n)
     } else {
@@ -281,7 +279,7 @@ pub(crate) fn diagnose_given_layers(
     })
 }
 
-/// Labels and covariance without the effects that are no causes.
+/// Labels and covariance of the base parameters and of effects that are causes.
 fn labels_of_causes(
     (labels, covariance): (Vec<LabelledParameter>, Vec<Vec<f64>>),
     causes: &[Cause],
@@ -318,10 +316,9 @@ fn random_effect_sd(search: &Search) -> RandomEffectSd {
     }
 }
 
-/// Standard deviation (N) of the samples within blocks that lie in air in front of the assumed surface; `None` without such
-/// blocks.
+/// Standard deviation (N) of the samples within blocks in air, before the assumed surface; `None` if there are too few.
 fn air_noise_n(scenario: &Scenario, data: &FitData) -> Option<f64> {
-    /// Blocks in air that are enough for a standard deviation to 10 %.
+    /// Smallest number of blocks in air: the standard deviation is then known to 10 %.
     const MIN_AIR_BLOCKS: usize = 50;
     let end_m = scenario.tissue.surface_m - 2.0 * scenario.surface_tolerance_m;
     let mut squares = Vec::new();
@@ -340,7 +337,7 @@ fn air_noise_n(scenario: &Scenario, data: &FitData) -> Option<f64> {
     (squares.len() >= MIN_AIR_BLOCKS).then(|| stylet_stats::mean(&squares).sqrt())
 }
 
-/// First two autoregressive coefficients per block, at the smallest forces.
+/// First two autoregressive coefficients per block in the range of the smallest forces.
 fn autoregression(search: &Search) -> [f64; 2] {
     search.data.noise.bins.first().map_or([0.0; 2], |b| [b.ar[0], b.ar[1]])
 }
@@ -369,7 +366,7 @@ fn has_cause(search: &Search, causes: &[Cause]) -> bool {
         || search.best.model.effects.iter().any(|e| causes.iter().any(|c| c.effect == e.info.id))
 }
 
-/// The scenario with the identified effects; in the presence of an unmodelled force with those of the partial model.
+/// The scenario with the identified effects; with an unmodelled force, with those of the partial model.
 fn extended_scenario(scenario: &Scenario, search: &Search, d: &Diagnosis) -> Scenario {
     let mut out = scenario.clone();
     let none = search.best.model.effects.is_empty() && d.verdict != Verdict::Unknown;

@@ -45,19 +45,19 @@ pub struct Cause {
     pub confidence: f64,
     /// Estimates by parameter path.
     pub parameters: BTreeMap<String, Estimate>,
-    /// Gain in nats.
+    /// Gain over the model without it, in nats.
     pub gain_nats: f64,
-    /// Share of the base law's residual variance beyond the noise that returns without this effect, 0 to 1.
+    /// Share (0 to 1) of the base law's residual variance above the noise that reappears without this effect.
     #[serde(default)]
     pub share: f64,
-    /// Paths of parameters that stand at a bound of the search: the data do not determine them.
+    /// Paths of parameters at a bound of the search, which the data do not determine.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub at_bound: Vec<String>,
-    /// Effects that hold this one as a special case and that these recordings cannot separate from it: the simpler one is
-    /// kept, and they share its confidence.
+    /// Effects that include this one as a special case and that these recordings cannot distinguish from it. The simpler effect is kept,
+    /// and all share its confidence.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub general_forms: Vec<String>,
-    /// What else is known, such as `50 Hz mains, aliased to 30 Hz`.
+    /// Remark, such as `50 Hz mains, aliased to 30 Hz`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub remark: Option<String>,
 }
@@ -90,48 +90,48 @@ pub struct BaseParameter {
     pub high: f64,
     /// Whether the assumed value lies outside the interval.
     pub changed: bool,
-    /// Whether the estimate lies at a bound of the tolerance.
+    /// Whether the estimate is at a bound of the search.
     pub at_bound: bool,
-    /// Whether the value is only a lower limit: a puncture force that no recording reached, which is at least `low`.
+    /// Whether the value is only a lower limit `low`: no recording reached this puncture force.
     #[serde(default)]
     pub at_least: bool,
-    /// Whether the whole interval lies outside the tolerance that the scenario states.
+    /// Whether the whole interval is outside the tolerance of the scenario.
     #[serde(default)]
     pub out_of_tolerance: bool,
 }
 
-/// What the recordings say about a parameter.
+/// Identifiability of a parameter from the recordings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ParameterLabel {
-    /// The data bound it on both sides, or to 10 %.
+    /// The data bound it on both sides, or determine it to 10 %.
     Determined,
     /// The data bound it on one side.
     OneSided,
-    /// The data do not bound it: the estimate is that of the prior.
+    /// The data do not bound it; the estimate is that of the prior.
     NotIdentifiable,
-    /// Known only together with another parameter.
+    /// Its estimate is strongly correlated with that of another parameter.
     TradesWith,
-    /// It stands at a bound of the search.
+    /// It is at a bound of the search.
     AtBound,
 }
 
-/// A parameter of the base law or of a cause, with what the recordings say about it.
+/// A parameter of the base law or of a cause, with its identifiability.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LabelledParameter {
     /// Layer, 1-based; 0 for the whole tissue and for effects.
     pub layer: usize,
-    /// Effect that it belongs to; `None` for the base law.
+    /// Effect of the parameter; `None` for the base law.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub effect: Option<String>,
-    /// Name, or path in the effect.
+    /// Name, or path within the effect.
     pub name: String,
-    /// What the recordings say about it.
+    /// Its identifiability.
     pub label: ParameterLabel,
-    /// The parameter whose estimate it correlates with most, by 0.9 or more.
+    /// Parameter with the most correlated estimate, if the correlation is 0.9 or more.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trades_with: Option<String>,
-    /// That correlation, -1 to 1; 0 without such a parameter.
+    /// Correlation with that parameter, -1 to 1; 0 without one.
     #[serde(default)]
     pub correlation: f64,
 }
@@ -144,7 +144,7 @@ impl LabelledParameter {
 }
 
 impl LabelledParameter {
-    /// The label in words.
+    /// The label in words, as in the report.
     #[must_use]
     pub fn label_in_words(&self) -> String {
         match (self.label, &self.trades_with) {
@@ -170,23 +170,23 @@ impl std::fmt::Display for LabelledParameter {
     }
 }
 
-/// A parameter fitted to each recording alone.
+/// Estimates of a parameter from each recording alone.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ParameterByRecording {
-    /// Its name.
+    /// Name of the parameter.
     pub parameter: String,
     /// Value and 95 % interval of each recording, in the order of `gain.recordings`; `None` where the recording does not determine it.
     pub estimates: Vec<Option<Estimate>>,
-    /// p-value of differences as large as these when the recordings have one value (Cochran's Q).
+    /// p-value of the differences between recordings under one common value (Cochran's Q).
     pub p_value: f64,
 }
 
 /// Grade of a model, or of one part of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Letter {
-    /// Predicts to the noise, from what the recordings determine.
+    /// Predicts to within the noise, with determined parameters.
     A,
-    /// Good, with a limit that another recording would lift.
+    /// Good, with a limitation that another recording would remove.
     B,
     /// Use with care.
     C,
@@ -200,7 +200,7 @@ pub enum Letter {
 pub struct GradePart {
     /// `error`, `residual`, `parameters`, `causes` or `recordings`.
     pub part: String,
-    /// Its letter.
+    /// Letter of this part.
     pub letter: Letter,
     /// The reason.
     pub reason: String,
@@ -209,14 +209,14 @@ pub struct GradePart {
 /// Grade of an extended model.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Grade {
-    /// The worst of the parts.
+    /// The worst letter of the parts.
     pub letter: Letter,
     /// The parts.
     pub parts: Vec<GradePart>,
 }
 
 impl Grade {
-    /// The letter with the reasons that keep it from being better.
+    /// The letter with the reasons for it.
     #[must_use]
     pub fn sentence(&self) -> String {
         let worst: Vec<&str> = self
@@ -233,7 +233,7 @@ impl Grade {
 /// Improvement of the prediction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gain {
-    /// Whether the errors are those of held-out recordings.
+    /// Whether the errors are those of held-out recordings instead of fitted ones.
     pub held_out: bool,
     /// Names of the recordings.
     pub recordings: Vec<String>,
@@ -241,8 +241,8 @@ pub struct Gain {
     pub rmse_before_n: f64,
     /// RMS error of the extended model in N.
     pub rmse_after_n: f64,
-    /// The same with ruptures, surface and friction of each recording as observed: what scatter between recordings does not
-    /// explain.
+    /// RMS error (N) of the extended model given the observed ruptures, surface and friction of each recording, so that scatter between
+    /// recordings does not count.
     #[serde(default)]
     pub rmse_given_scatter_n: f64,
     /// Standard deviation of the noise in N.
@@ -276,9 +276,9 @@ pub struct ResidualStructureReport {
     pub p_value: f64,
     /// Features on which the residual still depends.
     pub depends_on: Vec<String>,
-    /// Nats that the strongest dependence explains.
+    /// Gain (nats) of a model of the strongest dependence.
     pub nats: f64,
-    /// Share of the base law's residual variance beyond the noise that the extended model does not explain, 0 to 1.
+    /// Share (0 to 1) of the base law's residual variance above the noise that the extended model does not explain.
     #[serde(default)]
     pub share: f64,
 }
@@ -292,7 +292,7 @@ pub struct SearchCandidate {
     pub gain_nats: f64,
     /// Number of fitted parameters.
     pub parameters: usize,
-    /// Whether it was compared on averaged data only.
+    /// Whether it was compared only on averaged data.
     pub screened_only: bool,
 }
 
@@ -303,7 +303,7 @@ pub struct SearchStep {
     pub included: Vec<String>,
     /// Candidates, best first.
     pub candidates: Vec<SearchCandidate>,
-    /// Gain in nats that the best candidate needed.
+    /// Gain in nats required of the best candidate.
     pub required_nats: f64,
     /// The selected effect.
     pub selected: Option<String>,
@@ -343,12 +343,12 @@ pub struct DataQualityNote {
     pub note: QualityNote,
 }
 
-/// The best model beside an unmodelled force.
+/// The best model in the presence of an unmodelled force.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PartialModel {
     /// Effects of the model, causes included; some may imitate the unmodelled force.
     pub effects: Vec<String>,
-    /// Share of the base law's mean square held-out error beyond the noise that the model removes, 0 to 1.
+    /// Share (0 to 1) of the base law's mean square held-out error above the noise that the model removes.
     pub share: f64,
 }
 
@@ -356,31 +356,31 @@ pub struct PartialModel {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FindingKind {
-    /// The check of the recordings says that a diagnosis means nothing; it was forced.
+    /// The check rates the recordings unusable; the diagnosis was forced.
     Unusable,
-    /// The model predicts the recordings worse than noise and scatter between them explain.
+    /// Prediction errors exceed noise and scatter between recordings.
     PredictionError,
     /// The residual depends on a feature.
     ResidualStructure,
-    /// A parameter stands at its bound.
+    /// A parameter is at its bound.
     AtBound,
     /// A parameter is outside the tolerance of the assumed value.
     OutOfTolerance,
-    /// The recordings show another number of layers than the scenario has.
+    /// The recordings have another number of layers than the scenario.
     LayerCount,
     /// Recordings differ too much for one model.
     Scatter,
     /// The noise is far above that of the scenario's sensor, or above that in air.
     NoiseLevel,
-    /// A recording is not like the others.
+    /// A recording differs from all others.
     OutlierRecording,
-    /// One recording: none could be held out.
+    /// With one recording, none can be held out.
     OneRecording,
     /// All recordings have the same motion.
     OneMotion,
 }
 
-/// A reason against agreement with the data, or for less confidence.
+/// A reason against agreement, or for less confidence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Finding {
     /// Kind.
@@ -394,7 +394,7 @@ pub struct Finding {
 pub struct Diagnosis {
     /// Verdict.
     pub verdict: Verdict,
-    /// Whether the simulation agrees with the data: no effect is missing, and no finding contradicts.
+    /// Whether the simulation agrees with the data: no effect is missing, and no finding contradicts it.
     #[serde(default)]
     pub agrees: bool,
     /// Grade of the extended model; `None` for data sets of specimens.
@@ -403,26 +403,26 @@ pub struct Diagnosis {
     /// Findings that contradict agreement, or that limit the confidence.
     #[serde(default)]
     pub findings: Vec<Finding>,
-    /// What the recordings allow, found before the search: `items` of `check.json`.
+    /// Check of the recordings before the search: `items` of `check.json`.
     #[serde(default)]
     pub check: Vec<CheckItem>,
-    /// From which size on each effect of the library would be seen in these recordings.
+    /// Detectable size of each library effect in these recordings.
     #[serde(default)]
     pub visible_effects: Vec<EffectVisibility>,
-    /// The best model beside an unmodelled force, kept in `extended.ron`; only with the verdict `unknown`.
+    /// The best model in the presence of an unmodelled force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partial: Option<PartialModel>,
     /// Identified effects, largest gain first.
     pub causes: Vec<Cause>,
     /// Parameters of the base law as fitted.
     pub base_parameters: Vec<BaseParameter>,
-    /// What the recordings say about each parameter of the base law and of the causes.
+    /// Identifiability of each parameter of the base law and of the causes.
     #[serde(default)]
     pub parameters: Vec<LabelledParameter>,
     /// Covariance of these parameters, in their order and units.
     #[serde(default)]
     pub covariance: Vec<Vec<f64>>,
-    /// Parameters that the recordings determine, fitted to each recording alone.
+    /// Determined parameters, fitted to each recording alone.
     #[serde(default)]
     pub by_recording: Vec<ParameterByRecording>,
     /// Effects that are not identifiable from these recordings.
@@ -443,9 +443,9 @@ pub struct Diagnosis {
     /// Standard deviations of the random effects.
     #[serde(default)]
     pub random_effect_sd: RandomEffectSd,
-    /// Motions that would separate equivalent effects or show those that are not identifiable.
+    /// Motions that would distinguish equivalent effects or make effects identifiable.
     pub advice: Vec<String>,
-    /// What the recordings show about the extended scenario, for predictions.
+    /// Summary of the recordings for predictions with the extended scenario.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub training: Option<TrainingSummary>,
 }

@@ -1,5 +1,4 @@
-//! Forward selection of effects: each step adds the effect with the largest penalised gain, and effects that became
-//! superfluous are removed.
+//! Forward selection of effects: each step adds the effect with the largest penalised gain; superfluous effects are removed afterwards.
 
 use crate::base_law_fit::{PreparedRecordings, with_updated_times};
 use crate::effect_start::EffectStart;
@@ -20,24 +19,24 @@ use stylet_identify::score_test::ScoreTest;
 use stylet_stats::parallel::*;
 use stylet_tissue::ChainStage;
 
-/// Upper limit of selected effects.
+/// Largest number of selected effects.
 pub const MAX_EFFECTS: usize = 5;
 /// Candidates that get a short fit.
 const SHORT_FITS: usize = 8;
 /// Candidates that get a full fit after the short one.
 const FULL_FITS: usize = 4;
 
-/// A candidate is fitted when its first-order gain reaches this share of what it needs.
+/// Share of its required gain that the first-order gain of a candidate must reach for it to be fitted.
 const MIN_FIRST_ORDER_SHARE: f64 = 0.5;
-/// A full fit stops when, at its present rate of convergence, it would end more than this many nats behind the best.
+/// A full fit of a candidate stops when, at its rate of convergence, it would end more than this many nats behind the best.
 const STOP_DISTANCE_NATS: f64 = 100.0;
-/// Upper limit of restarts of the current model from a candidate's parameters.
+/// Largest number of restarts of the current model from a candidate's parameters.
 const MAX_RESTARTS: usize = 4;
 /// Selection steps in which candidates may be refitted from the prior.
 const MAX_PRIOR_STAGES: usize = 2;
 
 impl Search {
-    /// Runs the selection, starting from a fit of the base law.
+    /// Runs the selection from a fit of the base law.
     #[must_use]
     pub fn run(
         prepared: &PreparedRecordings,
@@ -48,7 +47,7 @@ impl Search {
         Self::run_from(Self::from_fit(base, data), prepared, progress)
     }
 
-    /// Continues the selection from a model that may have effects already.
+    /// Continues the selection from a model that may already have effects.
     #[must_use]
     pub(crate) fn run_from(
         start: Self,
@@ -73,8 +72,7 @@ impl Search {
         search
     }
 
-    /// Continues the selection with the reweighted fit ([`fit_reweighted`]), for use in the presence of an unmodelled
-    /// force.
+    /// Continues the selection with reweighted fits ([`fit_reweighted`]), for data with an unmodelled effect.
     #[must_use]
     pub fn continue_reweighted(&self, prepared: &PreparedRecordings) -> Option<Self> {
         let (best, data) = fit_reweighted(&self.best, &self.data)?;
@@ -87,7 +85,7 @@ impl Search {
         Some(search)
     }
 
-    /// This search with the model of `other`, when that model is better on all data with equal weights.
+    /// This search with the model of `other`, if that model is better on all data with equal weights.
     #[must_use]
     pub fn adopt_if_better(&self, other: &Self, prepared: &PreparedRecordings) -> Option<Self> {
         let model = with_updated_times(other.best.model.clone(), &self.data, &prepared.drop_times());
@@ -155,24 +153,24 @@ impl Search {
         any
     }
 
-    /// Start values of the effects whose first-order gain comes near what they need.
+    /// Start values of the effects whose first-order gain is close to what they require.
     fn promising_starts(&self, prepared: &PreparedRecordings) -> Vec<Vec<EffectStart>> {
         let blocks = self.data.compared_block_count();
         let mut ranked = effect_starts(&ScoreTest::new(&self.best, &self.data), prepared, &self.tones_hz);
         ranked.retain(|s| {
             let parameters = s[0].choice.info.parameters.iter().filter(|p| !p.integer).count();
-            // A rupture effect first looks like random scatter of ruptures, which shrinks when it is fitted.
+            // Before it is fitted, a rupture effect appears as scatter of the ruptures, so its first-order gain is too small.
             s[0].choice.info.stage == ChainStage::Puncture
                 || s[0].gain_nats > MIN_FIRST_ORDER_SHARE * (bic_penalty(parameters, blocks) + MIN_GAIN_NATS)
         });
         ranked
     }
 
-    /// Fits of the model plus one effect, best first: short fits on coarse blocks, then full fits of the best of them.
+    /// Fits of the model plus one effect, best first: short fits on coarse blocks, then full fits of the best.
     fn fit_candidates(&self, ranked: &[Vec<EffectStart>], coarse: &FitData, times: &[Vec<f64>]) -> Vec<Fit> {
         let by_ruptures = |s: &&Vec<EffectStart>| s[0].choice.info.stage == ChainStage::Puncture;
         let tried = ranked.iter().take(SHORT_FITS).chain(ranked.iter().skip(SHORT_FITS).filter(by_ruptures));
-        // Starts with their own model skip the short fit.
+        // Starts that bring their own model skip the short fit.
         let (with_model, tried): (Vec<&EffectStart>, Vec<&EffectStart>) =
             tried.flatten().partition(|s| s.model.is_some());
         let mut short: Vec<Fit> = tried
@@ -180,7 +178,7 @@ impl Search {
             .filter_map(|s| fit(&self.best.model.with_effect(s.choice.clone()), coarse, Effort::SHORT))
             .collect();
         self.rank(&mut short);
-        // Candidates far behind get no full fit.
+        // No full fit of candidates far behind the best.
         if let (Some(first), Some(current)) =
             (short.first().map(Fit::nats), residuals(&self.best.model, coarse))
         {
@@ -192,13 +190,12 @@ impl Search {
             let model = with_updated_times(model.clone(), &self.data, times);
             fit_if_below(&model, &self.data, Effort::FULL, wanted)
         };
-        // The best candidate is fitted to convergence, the others as long as they may come close.
+        // The best candidate is fitted to convergence; the other fits stop early if they cannot come close.
         let mut full: Vec<Fit> =
             short.first().and_then(|f| fitted(&f.model, f64::INFINITY)).into_iter().collect();
         let wanted = full.first().map_or(f64::INFINITY, |f| f.nats() + STOP_DISTANCE_NATS);
         let if_close = |model: &Model| fitted(model, wanted);
-        // With the assumed scatter rupture times move far; with the scatter at the present times they stay close. Both
-        // are tried.
+        // Rupture times updated under the assumed scatter move far, under the scatter of the present times little; both are tried.
         let near = |model: &Model| fit(model, &self.data, Effort::SHORT).and_then(|f| if_close(&f.model));
         let far = |model: &Model| {
             let model = with_updated_times(model.clone(), &self.data, times);
@@ -215,7 +212,7 @@ impl Search {
         bic_penalty(model.effect_parameter_count(), self.data.compared_block_count())
     }
 
-    /// Gain in nats that a fit needs to be selected.
+    /// Gain (nats) required of a fit to be selected.
     fn required_nats(&self, f: &Fit) -> f64 {
         self.penalty_of(&f.model) - self.penalty_of(&self.best.model) + MIN_GAIN_NATS
     }

@@ -10,9 +10,9 @@ pub struct EffectStart {
     pub choice: EffectTerm,
     /// First-order gain in nats.
     pub gain_nats: f64,
-    /// Nats by which the effect at its typical strength would be detected.
+    /// Expected gain (nats) of the effect at its typical strength.
     pub detectable_nats: f64,
-    /// The model to start from, when it is not the current model plus the effect; such a start skips the short fit.
+    /// Model to start from, if it is not the current model plus the effect.
     pub model: Option<Model>,
 }
 

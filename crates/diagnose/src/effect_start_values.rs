@@ -1,4 +1,4 @@
-//! Start values: first-order gain of every effect of the library, and the parameters from which its fit starts.
+//! Start values of candidate effects from score tests: first-order gain of each effect, and the parameters from which its fit starts.
 
 use crate::base_law_fit::PreparedRecordings;
 use crate::effect_start::EffectStart;
@@ -10,9 +10,7 @@ use stylet_identify::score_test::{ScoreTest, ScoreTestResult, scale_strengths};
 use stylet_stats::parallel::*;
 use stylet_tissue::{ChainStage, EffectInfo, Proposal};
 
-/// Best start values of every effect that the model does not include, at most two each, largest gain first.
-///
-/// `tones_hz` are the frequencies (Hz) of tones in the residual.
+/// Best start values of every effect that the model does not include: at most two each, largest gain first.
 #[must_use]
 pub fn effect_starts(
     score_test: &ScoreTest,
@@ -40,7 +38,7 @@ pub fn effect_starts(
     all
 }
 
-/// Start values of one effect, by the kind of its proposal.
+/// Start values of one effect, by its kind of proposal.
 fn starts_of(
     info: &'static EffectInfo,
     score_test: &ScoreTest,
@@ -49,14 +47,14 @@ fn starts_of(
 ) -> Vec<EffectStart> {
     let assumed = &score_test.fit.model.assumed;
     match info.proposal {
-        // It scales all thicknesses.
+        // A position scale is not identifiable if all thicknesses are guessed.
         Proposal::LinearColumns(_) if info.stage == ChainStage::Position && assumed.is_geometry_guessed() => {
             Vec::new()
         }
         Proposal::LinearColumns(groups) => {
             groups.iter().filter_map(|g| start_of_columns(info, score_test, g)).collect()
         }
-        // Free thicknesses already move every layer boundary.
+        // Free thicknesses already shift every layer boundary.
         Proposal::LayerFaces(_) if score_test.fit.model.free.thickness => Vec::new(),
         Proposal::LayerFaces(shift) => (1..score_test.fit.model.layers())
             .filter_map(|l| start_of_columns(info, score_test, &[&[l as f64, shift]]))
@@ -68,7 +66,7 @@ fn starts_of(
     }
 }
 
-/// Start value of a group of columns.
+/// Start value from the joint gain of a group of columns.
 fn start_of_columns(
     info: &'static EffectInfo,
     score_test: &ScoreTest,
@@ -82,7 +80,7 @@ fn start_of_columns(
     start(info, score_test, group, &columns, gain)
 }
 
-/// The start value for given coefficients, when they are valid parameters.
+/// The start value with the coefficients of `gain`, if they are valid parameters.
 fn start(
     info: &'static EffectInfo,
     score_test: &ScoreTest,
@@ -96,7 +94,7 @@ fn start(
     let one_sided =
         info.parameters.iter().all(|p| !p.strength || p.low >= p.inactive || p.inactive == f64::INFINITY);
     if one_sided && gain.coefficients.iter().any(|c| *c <= 0.0) {
-        // Columns with a coefficient of the wrong sign are dropped; the others may still gain.
+        // Without the columns whose coefficients have the wrong sign.
         let kept: Vec<usize> = (0..group.len()).filter(|k| gain.coefficients[*k] > 0.0).collect();
         if kept.is_empty() {
             return None;
@@ -109,12 +107,12 @@ fn start(
     Some(EffectStart::new(choice, &gain))
 }
 
-/// Lowest and highest breathing frequency in Hz.
+/// Range of breathing frequencies (Hz): 3 to 72 breaths per minute.
 const BREATHING_HZ: (f64, f64) = (0.05, 1.2);
 
-/// Tissue motions on a grid of frequencies.
+/// Start values of a tissue motion on a grid of frequencies.
 fn breathing_starts(info: &'static EffectInfo, score_test: &ScoreTest) -> Vec<EffectStart> {
-    /// Amplitude in m of the unit columns.
+    /// Amplitude (m) of the unit columns.
     const AMPLITUDE_M: f64 = 1e-4;
     let longest = score_test.data.recordings.iter().map(|b| b.span_s().1 - b.span_s().0).fold(1.0, f64::max);
     let step = 0.6 / longest;
@@ -143,8 +141,7 @@ fn breathing_starts(info: &'static EffectInfo, score_test: &ScoreTest) -> Vec<Ef
         .collect()
 }
 
-/// Amplitude and phase of a sinusoid from the coefficients of its sine and cosine columns, which have the amplitude
-/// `unit`.
+/// Start value of a sinusoid from the coefficients of its sine and cosine columns of amplitude `unit`.
 fn sinusoid_start(
     info: &'static EffectInfo,
     hz: f64,
@@ -164,9 +161,9 @@ type BlockValues = Vec<Vec<f64>>;
 fn force_derivatives(score_test: &ScoreTest) -> Option<(BlockValues, BlockValues)> {
     use stylet_identify::forward_model::{ReplayResult, replay_with_ruptures};
     use stylet_identify::likelihood::motion_pieces;
-    /// Step in m of the derivative with respect to depth.
+    /// Finite difference (m) for the derivative with respect to depth.
     const DZ_M: f64 = 1e-6;
-    /// Step in m/s of the derivative with respect to speed.
+    /// Finite difference (m/s) for the derivative with respect to speed.
     const DV_MPS: f64 = 1e-6;
     let model = &score_test.fit.model;
     let (mut fz, mut fv) = (Vec::new(), Vec::new());
@@ -186,7 +183,7 @@ fn force_derivatives(score_test: &ScoreTest) -> Option<(BlockValues, BlockValues
             x.iter().zip(&out[0].force_n).map(|(x, f)| (x - f) / h).collect()
         };
         fz.push(slope(&out[1].force_n, DZ_M));
-        // Near zero speed a finite difference would cross the jump of dry friction.
+        // Near zero speed, a finite difference contains the jump of Coulomb friction.
         let mut v = slope(&out[2].force_n, DV_MPS);
         v.iter_mut().for_each(|v| {
             if v.abs() > 1e5 {
@@ -198,7 +195,7 @@ fn force_derivatives(score_test: &ScoreTest) -> Option<(BlockValues, BlockValues
     Some((fz, fv))
 }
 
-/// Sinusoidal forces at the tones of the residual.
+/// Start values of a sinusoidal force at the tones of the residual.
 fn tone_starts(info: &'static EffectInfo, score_test: &ScoreTest, tones_hz: &[f64]) -> Vec<EffectStart> {
     tones_hz
         .iter()
@@ -213,10 +210,10 @@ fn tone_starts(info: &'static EffectInfo, score_test: &ScoreTest, tones_hz: &[f6
         .collect()
 }
 
-/// Stretches in m at which an elastic element may break.
+/// Trial stretches (m) at which an elastic element breaks.
 const STRETCHES_M: [f64; 4] = [8e-4, 3e-3, 8e-3, 2e-2];
 
-/// Elastic elements that break: at force drops that are not assigned to a layer, and on a grid of depths.
+/// Start values of a breaking elastic element at force drops that are not assigned to a layer, and on a grid of depths.
 fn break_starts(
     info: &'static EffectInfo,
     score_test: &ScoreTest,
@@ -280,12 +277,12 @@ fn break_starts(
     out
 }
 
-/// Drops within this distance (m) belong to one place.
+/// Distance (m) within which drops of different recordings belong to one place.
 const SAME_PLACE_M: f64 = 3e-3;
-/// Upper limit of places.
+/// Largest number of places; those with the largest drops are kept.
 const MAX_PLACES: usize = 6;
 
-/// Elastic elements that break where every recording shows a drop, whether or not it is assigned to a layer.
+/// Start values of a breaking elastic element at places where every recording shows a drop, whether or not it is assigned to a layer.
 pub(crate) fn starts_at_common_drops(
     info: &'static EffectInfo,
     prepared: &PreparedRecordings,

@@ -12,12 +12,12 @@ pub enum DiagnoseError {
          scenario"
     )]
     NoContact,
-    /// Fewer layers in the recordings than asked for.
+    /// The recordings show fewer layers than requested.
     #[error(
         "the recordings show {found} layer(s), not {asked}; leave the number away, or describe the layers in a scenario"
     )]
     FewerLayers {
-        /// Layers asked for.
+        /// Requested number of layers.
         asked: usize,
         /// Layers found.
         found: usize,
@@ -54,7 +54,7 @@ pub enum DiagnoseError {
         deepest_m: f64,
         /// Surface.
         surface_m: f64,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// The needle starts behind the tissue.
@@ -119,12 +119,12 @@ pub enum DiagnoseError {
         /// Scale that would correct it.
         scale: f64,
     },
-    /// The check of the recordings says that a diagnosis would mean nothing.
+    /// The check rates the recordings unusable.
     #[error(
         "a diagnosis of these recordings would mean nothing: {reasons}; look at `stylet check`; `stylet diagnose --force` goes on all the same"
     )]
     Unusable {
-        /// What stands against it.
+        /// The reasons.
         reasons: String,
     },
     /// The base law could not be fitted.
@@ -133,7 +133,7 @@ pub enum DiagnoseError {
 }
 
 impl DiagnoseError {
-    /// Whether recordings can be diagnosed all the same, although their units, signs or reach are not those of the scenario.
+    /// Whether the recordings can still be diagnosed with `force`: only their units, signs or reach differ from the scenario.
     #[must_use]
     pub fn is_implausible(&self) -> bool {
         matches!(

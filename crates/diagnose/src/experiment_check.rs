@@ -1,4 +1,4 @@
-//! Before the fit: what recordings can show, and what they cannot.
+//! Checks before the effect search what recordings can show about a scenario.
 
 use crate::base_law_fit::{PreparedRecordings, assumptions_of, fit_base_law};
 use crate::check_json::{CheckItem, EffectVisibility, Light};
@@ -21,38 +21,38 @@ use stylet_score::{ContactFinding, ContactHypothesis, Trace};
 use stylet_stats::parallel::*;
 use stylet_tissue::Tissue;
 
-/// Speeds inside the tissue that differ by less than this factor count as one.
+/// Ratio below which the speeds inside the tissue count as one.
 const ONE_SPEED_FACTOR: f64 = 1.2;
-/// A speed below this share of the largest one is a hold.
+/// Share of the largest speed below which the needle holds.
 const HOLD_SHARE: f64 = 0.05;
-/// A hold of this duration in s shows relaxation.
+/// Duration (s) from which a hold shows relaxation.
 const MIN_HOLD_S: f64 = 0.5;
-/// Seed of the bootstrap: equal recordings give equal results.
+/// Seed of the bootstrap, constant so that equal recordings give equal results.
 const BOOTSTRAP_SEED: u64 = 1;
 
-/// What recordings can show: `check.json`.
+/// Result of the check, serialised as `check.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ExperimentCheck {
-    /// The aspects, in the order in which to read them.
+    /// The aspects, most important first.
     pub items: Vec<CheckItem>,
-    /// Parameters of the base law as these recordings determine them, without any effect.
+    /// Estimated parameters of the base law, without effects.
     pub base_parameters: Vec<BaseParameter>,
-    /// What the recordings say about each of them.
+    /// Identifiability of each parameter.
     pub parameters: Vec<LabelledParameter>,
-    /// The effects of the library.
+    /// Detectable size of each library effect.
     pub effects: Vec<EffectVisibility>,
 }
 
 impl ExperimentCheck {
-    /// Whether a diagnosis would mean anything.
+    /// Whether no item rates the recordings unusable.
     #[must_use]
     pub fn is_usable(&self) -> bool {
         self.items.iter().all(|item| item.light != Light::Unusable)
     }
 }
 
-/// Checks what recordings can show about a scenario, before any effect is searched. What makes a diagnosis meaningless is an item of the
-/// result, not an error.
+/// Checks what recordings can show about a scenario, before effects are searched. Reasons against a diagnosis are items of the result, not
+/// errors.
 ///
 /// # Errors
 /// [`DiagnoseError::NoFit`] when the scenario cannot be replayed along the recordings.
@@ -81,8 +81,8 @@ pub fn check_experiment(
     Ok(out)
 }
 
-/// What recordings allow, as far as it is known before a fit: data quality, contact, motion and depth. `clean` and `notes` are the
-/// recordings without samples that are not finite, and the notes on their quality.
+/// Checks that need no fit: data quality, contact, motion and depth. `clean` are the recordings without non-finite samples, `notes` the
+/// notes on their quality.
 pub(crate) fn check_before_fit(
     scenario: &Scenario,
     recordings: &[NamedRecording],
@@ -117,7 +117,7 @@ pub(crate) fn check_before_fit(
     items
 }
 
-/// How each recording begins, by the online algorithm.
+/// Contact at the start of each recording, from the online algorithm.
 fn check_contact(recordings: &[NamedRecording], clean: &[Recording]) -> Vec<CheckItem> {
     let config = EnhanceConfig::default();
     let find = |r: &Recording| {
@@ -139,7 +139,7 @@ fn check_contact(recordings: &[NamedRecording], clean: &[Recording]) -> Vec<Chec
     recordings.iter().zip(&found).map(item).collect()
 }
 
-/// What the motion excites: speeds, holds, retraction, and depth.
+/// Excitation by the motion: speeds, holds, retraction, depth.
 fn check_motion(tissue: &Tissue, recordings: &[Recording]) -> Vec<CheckItem> {
     let mut items = Vec::new();
     let (mut slowest, mut fastest) = (f64::INFINITY, 0.0_f64);
@@ -200,7 +200,7 @@ fn check_motion(tissue: &Tissue, recordings: &[Recording]) -> Vec<CheckItem> {
     items
 }
 
-/// How many parameters of the layers these recordings determine.
+/// Item: number of determined layer parameters.
 pub(crate) fn parameters_item(parameters: &[LabelledParameter]) -> CheckItem {
     let of_layers = || parameters.iter().filter(|p| p.effect.is_none());
     let open: Vec<String> = of_layers()
@@ -217,7 +217,7 @@ pub(crate) fn parameters_item(parameters: &[LabelledParameter]) -> CheckItem {
     CheckItem::new("parameters", Light::Limited, message)
 }
 
-/// How many effects would be seen at their typical size.
+/// Item: number of effects detectable at their typical size.
 pub(crate) fn effects_item(effects: &[EffectVisibility]) -> CheckItem {
     let hidden: Vec<&str> = effects.iter().filter(|e| !e.visible).map(|e| e.effect.as_str()).collect();
     let total = effects.len();

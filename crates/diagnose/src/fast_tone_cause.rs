@@ -1,4 +1,4 @@
-//! Tones that were removed from the samples as a cause, and mains hum by its frequency.
+//! Reports tones that were removed from the samples as a cause, and identifies mains hum by its frequency.
 
 use crate::diagnosis_json::{Cause, Estimate};
 use crate::fast_tones::{FastTone, WithSd};
@@ -11,7 +11,7 @@ use stylet_stats::Z95;
 use stylet_stats::number_format::significant;
 use stylet_tissue::{AnyEffect, Effect, EffectInfo, Proposal, general_effects};
 
-/// A tone is that of a known effect when their frequencies differ by at most this many Hz: mains drifts by as much.
+/// Largest frequency difference (Hz) between a tone and a known effect: mains drifts by as much.
 const SAME_TONE_HZ: f64 = 0.3;
 /// Confidence in a tone that passed its test.
 const TONE_CONFIDENCE: f64 = 0.99;
@@ -27,13 +27,13 @@ fn is_tone(effect: &AnyEffect, tone: &FastTone) -> bool {
         && (parameter(effect, "Hz") - tone.frequency_hz.0).abs() < SAME_TONE_HZ
 }
 
-/// The assumptions without the known tones that were removed from the samples.
+/// Assumptions without the known tones that were removed from the samples.
 pub(crate) fn without_removed_tones(mut assumed: Assumptions, tones: &[FastTone]) -> Assumptions {
     assumed.known_effects.retain(|effect| !tones.iter().any(|t| is_tone(effect, t)));
     assumed
 }
 
-/// The strongest removed tone that the scenario does not know, with the others in its remark.
+/// The strongest removed tone that is not in the scenario, as a cause; its remark lists the others.
 pub(crate) fn fast_tone_cause(
     tones: &[FastTone],
     known: &[AnyEffect],
@@ -98,7 +98,7 @@ pub(crate) fn tone_mean_square_n2(cause: &Cause) -> f64 {
     0.5 * value.0 * value.0
 }
 
-/// Adds what is known about their frequency to tones that the search found.
+/// Adds a remark on mains to tones that the search found.
 pub(crate) fn mark_mains(causes: &mut [Cause], search: &Search) {
     let Some(b) = search.data.recordings.first() else { return };
     let (start_s, end_s) = b.span_s();

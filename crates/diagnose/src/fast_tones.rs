@@ -1,9 +1,9 @@
-//! Tones above the band of the block means: found, fitted and removed at the sampling rate.
+//! Detects, fits and removes tones above the band of the block means, at the sampling rate.
 //!
-//! A mean over 20 ms removes 50 Hz and its multiples exactly, and attenuates every tone above half the rate of the blocks;
-//! the tests on block means then take it for noise. The samples are therefore tested before they are averaged. Mains
-//! drifts, so amplitude and phase are fitted in windows of one second; the frequency and, where the phase is stable, the
-//! amplitude come from whole recordings, with the Cramér-Rao bounds of a sinusoid in noise (Rife and Boorstyn 1974).
+//! A mean over 20 ms removes 50 Hz and its multiples exactly and attenuates all tones above half the block rate, so tests on block means
+//! take them for noise. The frequency of mains drifts, so amplitude and phase are fitted in windows of one second. The frequency and, if
+//! the phase is stable, the amplitude are estimated from whole recordings, with the Cramér-Rao bounds of a sinusoid in noise (Rife and
+//! Boorstyn 1974).
 
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty};
 use core::f64::consts::{PI, TAU};
@@ -12,22 +12,22 @@ use stylet_stats::order_statistics::median_of;
 use stylet_stats::parallel::*;
 use stylet_stats::spectrum::{PADDING, PowerSpectrum, SampledSignal};
 
-/// Length in s of the windows in which amplitude and phase are constant.
+/// Length (s) of the windows in which amplitude and phase are assumed constant.
 const WINDOW_S: f64 = 1.0;
 /// Largest number of tones that are removed.
 const MAX_TONES: usize = 6;
-/// A tone is tested when its power exceeds the median of its surroundings by this factor.
+/// Ratio of a spectral peak to the median around it from which it is tested as a tone.
 const MIN_POWER_RATIO: f64 = 8.0;
-/// Half width of the surroundings, in frequency resolutions.
+/// Half width of the range of that median, in frequency resolutions.
 const SURROUNDING_RESOLUTIONS: usize = 60;
-/// A smaller amplitude, in standard deviations of the samples within their blocks, is negligible.
+/// Smallest amplitude, in standard deviations of the samples within their blocks; smaller tones are negligible.
 const MIN_AMPLITUDE_SD: f64 = 0.15;
-/// Share of a tone's power that is in phase over whole recordings, from which its phase is stable.
+/// Share of a tone's power that is coherent over whole recordings from which its phase counts as stable.
 const MIN_COHERENCE: f64 = 0.9;
-/// Phases of two recordings agree within this many standard deviations.
+/// Largest deviation of a recording's phase from the common phase, in standard deviations.
 const PHASE_AGREEMENT_SD: f64 = 4.0;
 
-/// A sample belongs to a rupture or a velocity jump from this many median deviations on; the peak of a tone has 1.4.
+/// Deviation, in median absolute deviations, from which a sample belongs to a rupture or a velocity jump; the peak of a tone is at 1.4.
 const MAX_DEVIATION: f64 = 8.0;
 
 /// A value with its standard deviation.
@@ -40,13 +40,13 @@ pub(crate) struct FastTone {
     pub frequency_hz: WithSd,
     /// Amplitude in N.
     pub amplitude_n: WithSd,
-    /// Phase at time zero in rad; of the first recording, with an infinite deviation, where recordings differ.
+    /// Phase at time zero in rad. If recordings differ: that of the first one, with infinite standard deviation.
     pub phase_rad: WithSd,
-    /// Gain of its removal in nats, beyond the penalty of its parameters.
+    /// Gain of its removal in nats, after the penalty of its parameters.
     pub gain_nats: f64,
 }
 
-/// Samples of one recording without their smooth course.
+/// High-frequency part of the samples of one recording.
 struct Samples<'a> {
     time_s: &'a [f64],
     step_s: f64,
@@ -57,7 +57,7 @@ struct Samples<'a> {
     length: usize,
 }
 
-/// Removes the tones above half the rate of blocks of `block_s` from the forces; samples marked in `exclude` are not used.
+/// Removes tones above half the rate of blocks of `block_s` (s) from the forces; samples marked in `exclude` are not used.
 pub(crate) fn remove_fast_tones(
     recordings: &mut [Recording],
     exclude: &[Vec<bool>],
@@ -103,7 +103,7 @@ impl<'a> Samples<'a> {
         r.force_n.iter().for_each(|f| sums.push(sums.last().copied().unwrap_or(0.0) + f));
         let fast_n = (0..n)
             .map(|k| {
-                // Symmetric, so that a slope cancels.
+                // The window is symmetric, so that a slope cancels.
                 let half = (length / 2).min(k).min(n - 1 - k);
                 let (lo, hi) = (k - half, k + half + 1);
                 if used[k] { r.force_n[k] - (sums[hi] - sums[lo]) / (hi - lo) as f64 } else { 0.0 }
@@ -114,7 +114,7 @@ impl<'a> Samples<'a> {
         samples
     }
 
-    /// Excludes the samples around ruptures and velocity jumps, which are no part of a tone.
+    /// Excludes samples around ruptures and velocity jumps.
     fn exclude_steps(&mut self) {
         let limit_n = MAX_DEVIATION * median_of(self.fast_n.iter().map(|x| x.abs()));
         let steps: Vec<usize> = (0..self.fast_n.len()).filter(|k| self.fast_n[*k].abs() > limit_n).collect();
@@ -126,7 +126,7 @@ impl<'a> Samples<'a> {
         }
     }
 
-    /// Share of a tone's amplitude that the subtraction of the moving average keeps.
+    /// Share of a tone's amplitude that remains after subtraction of the moving average.
     fn response(&self, hz: f64) -> f64 {
         let half = PI * hz * self.step_s;
         let n = self.length as f64;
@@ -143,7 +143,7 @@ impl<'a> Samples<'a> {
             (ss, sc, cc) = (ss + a * a, sc + a * b, cc + b * b);
             (s, c, n) = (s + a * self.fast_n[k], c + b * self.fast_n[k], n + 1.0);
         }
-        // At half the sampling rate only one of the two columns is determined.
+        // Ridge, because at half the sampling rate only one of both columns is determined.
         let ridge = 1e-3 * n;
         let det = (ss + ridge) * (cc + ridge) - sc * sc;
         if det <= 0.0 {
@@ -169,7 +169,7 @@ impl<'a> Samples<'a> {
     }
 }
 
-/// Power of all recordings at one frequency, each with its own phase.
+/// Power of all recordings at one frequency, each with its own phase, weighted by their samples.
 fn power(samples: &[Samples], hz: f64) -> f64 {
     let of = |s: &Samples| {
         let ([a, b], n) = s.sinusoid(hz, 0..s.fast_n.len());
@@ -188,8 +188,8 @@ fn strongest_tone(samples: &[Samples], lowest_hz: f64) -> Option<(FastTone, Vec<
     let (peak, floor) = spectral_peak(&spectrum, lowest_hz)?;
     let first = samples.first()?;
     let hz = refined(samples, peak as f64 * spectrum.bin_hz, spectrum.bin_hz, 0.5 / first.step_s);
-    // One-sided density of white noise: twice variance times step. The median of a mean of exponential variables lies below
-    // their mean (Wilson and Hilferty 1931).
+    // The one-sided density of white noise is twice variance times step. The median of a mean of exponential variables is below its mean
+    // (Wilson and Hilferty 1931).
     let to_mean = (1.0 - 1.0 / (9.0 * samples.len() as f64)).powi(3);
     let variance = floor / to_mean / (2.0 * first.step_s) / first.response(hz).powi(2);
     let bins = spectrum.density.len() as f64 / PADDING as f64;
@@ -200,7 +200,7 @@ fn strongest_tone(samples: &[Samples], lowest_hz: f64) -> Option<(FastTone, Vec<
     (tone.gain_nats > needed && tone.amplitude_n.0 > MIN_AMPLITUDE_SD * noise_sd).then_some((tone, waves))
 }
 
-/// Bin of the largest ratio of power to the median around it, and this median.
+/// Bin with the largest ratio of power to the median around it, and this median; `None` if no ratio is large enough.
 fn spectral_peak(spectrum: &PowerSpectrum, lowest_hz: f64) -> Option<(usize, f64)> {
     let power = &spectrum.density;
     let first = (lowest_hz / spectrum.bin_hz).ceil() as usize;
@@ -220,11 +220,11 @@ fn spectral_peak(spectrum: &PowerSpectrum, lowest_hz: f64) -> Option<(usize, f64
     best
 }
 
-/// The frequency of largest power within a bin of a peak, by golden section.
+/// Frequency (Hz) of the largest power within a bin of a peak, by golden section.
 fn refined(samples: &[Samples], hz: f64, bin_hz: f64, highest_hz: f64) -> f64 {
-    /// Golden section.
+    /// Ratio of the golden section.
     const SHARE: f64 = 0.618_033_988_749_894_9;
-    /// Steps of the golden section: to 1e-5 of a bin.
+    /// Steps of the golden section, which locate the maximum to 1e-5 of a bin.
     const ITERATIONS: usize = 24;
     let (mut low, mut high) = (hz - bin_hz, (hz + bin_hz).min(highest_hz));
     let (mut a, mut b) = (high - SHARE * (high - low), low + SHARE * (high - low));
@@ -243,7 +243,7 @@ fn refined(samples: &[Samples], hz: f64, bin_hz: f64, highest_hz: f64) -> f64 {
     0.5 * (low + high)
 }
 
-/// Fit of a tone at a frequency in noise of this variance per sample, and its force in every recording.
+/// Fits a tone of one frequency in noise of `variance` (N²) per sample; returns it and its force in every recording.
 fn fitted(samples: &[Samples], hz: f64, variance: f64) -> (FastTone, Vec<Vec<f64>>) {
     let mut waves = Vec::with_capacity(samples.len());
     let (mut window_power, mut stable_power, mut all, mut windows) = (0.0, 0.0, 0.0, 0.0);
@@ -279,7 +279,7 @@ fn fitted(samples: &[Samples], hz: f64, variance: f64) -> (FastTone, Vec<Vec<f64
     let count = all.max(2.0) as usize;
     let penalty = |of: f64| bic_penalty((2.0 * of) as usize + 1, count);
     let gain_nats = (window_nats - penalty(windows)).max(stable_nats - penalty(recordings));
-    // Two coefficients of noise alone have one nat.
+    // Two coefficients fitted to noise gain one nat.
     let is_stable = stable_nats - recordings > MIN_COHERENCE * (window_nats - windows);
     let nats = if is_stable { stable_nats - recordings } else { window_nats - windows };
     let amplitude = (4.0 * variance * nats.max(0.0) / f64::max(all, 1.0)).sqrt();
@@ -289,7 +289,7 @@ fn fitted(samples: &[Samples], hz: f64, variance: f64) -> (FastTone, Vec<Vec<f64
     let frequency_sd = if is_stable {
         bound
     } else {
-        /// Neighbouring windows that count as one: the frequency drifts slowly.
+        /// Number of neighbouring windows that count as one, because the frequency drifts slowly.
         const DEPENDENT_WINDOWS: f64 = 10.0;
         let scatter = stylet_stats::sd(&steps);
         bound.max(scatter * (DEPENDENT_WINDOWS / steps.len().max(1) as f64).sqrt())
@@ -308,7 +308,7 @@ fn fitted(samples: &[Samples], hz: f64, variance: f64) -> (FastTone, Vec<Vec<f64
     (tone, waves)
 }
 
-/// The common phase of recordings, if theirs agree.
+/// Common phase of the recordings; `None` if they disagree.
 fn common_phase(phases: &[WithSd]) -> Option<f64> {
     let (mut s, mut c) = (0.0, 0.0);
     for (phase, sd) in phases {

@@ -1,4 +1,4 @@
-//! Layers of a tissue from the recordings alone, as the online algorithm finds them: no scenario is needed.
+//! Layers of a tissue from the recordings alone, found by the online algorithm; the input when there is no scenario.
 
 use stylet_core::{EnhanceConfig, Sample};
 use stylet_record::Recording;
@@ -7,7 +7,7 @@ use stylet_stats::median_of;
 use stylet_stats::parallel::*;
 use stylet_tissue::{Layer, Tissue};
 
-/// Thinnest layer in m.
+/// Smallest thickness of a layer in m.
 const MIN_THICKNESS_M: f64 = 5e-4;
 
 /// Layers that the online algorithm found in several recordings: medians over those with the same number of layers.
@@ -25,15 +25,15 @@ pub(crate) struct MedianLayer {
     pub stiffness_n_per_m: f64,
     /// Friction in N s/m².
     pub friction_ns_per_m2: f64,
-    /// Thickness in m; of a layer that did not rupture, what the needle reached.
+    /// Thickness in m; without a rupture, the reached part of it.
     pub thickness_m: f64,
     /// Elastic force in N at the rupture; `None` without a rupture.
     pub rupture_n: Option<f64>,
 }
 
 impl FoundTissue {
-    /// The tissue with the most frequent number of layers, or with `count` where any recording shows as many or more. `None` without
-    /// a contact: the needle touches nothing, or begins in the tissue.
+    /// Tissue with the most frequent number of layers, or with `count` layers if a recording shows at least as many. `None` without a
+    /// contact, or if the recordings begin in tissue.
     pub(crate) fn new(recordings: &[Recording], count: Option<usize>) -> Option<Self> {
         let config = EnhanceConfig::default();
         let layers = |r: &Recording| {
@@ -68,9 +68,9 @@ impl FoundTissue {
         Some(Self { surface_m, layers: (0..count).map(layer).collect() })
     }
 
-    /// As a tissue of a scenario. The last layer continues below the deepest point.
+    /// The tissue for a scenario. The last layer continues below the deepest point.
     pub(crate) fn tissue(&self) -> Tissue {
-        /// Part of the last layer below the deepest point, relative to what was reached.
+        /// Thickness of the last layer below the deepest point, as a share of the reached part.
         const BEYOND_SHARE: f64 = 0.2;
         let layer = |(k, l): (usize, &MedianLayer)| Layer {
             name: format!("layer {}", k + 1),

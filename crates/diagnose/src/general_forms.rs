@@ -1,8 +1,7 @@
-//! Effects that hold a cause as a special case and that the recordings cannot separate from it.
+//! Finds effects that include a cause as a special case and that the recordings cannot distinguish from it.
 //!
-//! The selection prefers the special case unless the general effect gains more than its parameters cost. Where the motion
-//! would not show the difference at all, that preference is a convention and no result: the report says so, and the
-//! confidence is shared.
+//! The selection prefers the special case unless the gain of the general effect exceeds its additional penalty. If the motion cannot show
+//! the difference, this preference is only a convention; the general forms are then reported and share the confidence.
 
 use crate::competing_effects::EQUIVALENCE_NATS;
 use crate::diagnosis_json::Cause;
@@ -11,7 +10,7 @@ use stylet_identify::model::EffectTerm;
 use stylet_identify::score_test::ScoreTest;
 use stylet_tissue::{EffectInfo, ParameterInfo, effect_info};
 
-/// Lists the general forms that the recordings cannot separate from each cause, and shares its confidence with them.
+/// Lists the general forms that the recordings cannot distinguish from each cause, and divides the confidence among them.
 pub(crate) fn mark_general_forms(causes: &mut [Cause], search: &Search) {
     let nested = |c: &&mut Cause| effect_info(&c.effect).is_some_and(|i| !i.nested_in.is_empty());
     let mut nested: Vec<&mut Cause> = causes.iter_mut().filter(nested).collect();
@@ -31,8 +30,8 @@ pub(crate) fn mark_general_forms(causes: &mut [Cause], search: &Search) {
     }
 }
 
-/// Whether a general effect of typical shape and of the cause's size, with all fitted parameters adapted, would differ from
-/// the cause by less than the width of an equivalence class.
+/// Whether a general effect of typical shape and of the cause's strength would, after refitting all parameters, differ from the cause by
+/// less than [`EQUIVALENCE_NATS`].
 fn is_alike(general: &'static EffectInfo, cause: &EffectTerm, score_test: &ScoreTest) -> bool {
     let strength = cause.info.parameters.iter().zip(&cause.values).find(|(p, _)| p.strength);
     let Some(size) = strength.map(|(p, value)| value / p.start).filter(|s| s.is_finite()) else {

@@ -1,9 +1,9 @@
-//! Selection of the geometry: is the assumed geometry right, and if not, which effect explains the deviation?
+//! Selects the geometry: fixes surface and thicknesses that agree with the prior, or finds the effect that explains their deviation.
 //!
-//! Surface and thicknesses are free from the start and are no causes. Where the estimates agree with the prior they are
-//! fixed, which saves their parameters. A position scale moves all layer boundaries in proportion, and a shifted
-//! boundary trades one thickness for the next: with a free geometry neither is identifiable, so their parameters must
-//! pay for themselves against the saved ones. A thickness outside its tolerance is penalised like a shifted boundary.
+//! Surface and thicknesses are free at first and are not causes. Where the estimates agree with the prior they are fixed, which saves their
+//! penalty. A position scale changes all thicknesses in proportion, and a shifted boundary changes two neighbours by opposite amounts, so
+//! neither is identifiable with a free geometry; their gain must exceed their penalty compared with the fixed geometry. A thickness outside
+//! its tolerance is penalised like a shifted boundary.
 
 use crate::base_law_fit::{PreparedRecordings, with_updated_times};
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
@@ -14,13 +14,13 @@ use stylet_identify::model::{EffectTerm, FreeParameters, Model};
 use stylet_stats::parallel::*;
 use stylet_tissue::{ChainStage, EffectInfo, Proposal};
 
-/// Largest deviation of the free parameters from a pattern, relative to its size.
+/// Largest deviation of the free thicknesses from the pattern of an effect, relative to the size of the pattern.
 const PATTERN_TOLERANCE: f64 = 0.2;
-/// Thicknesses that must follow a pattern. Any single one is in proportion; two agree by chance in one tissue of
-/// thirty, more often than the position scale is wrong or a boundary is shifted.
+/// Number of thicknesses that must follow the pattern. One always does; two do by chance in one tissue of thirty, which is more frequent
+/// than a wrong position scale or a shifted boundary.
 const MIN_THICKNESSES: usize = 3;
 
-/// Penalty in nats of the effects and the free geometry of a model.
+/// Penalty (nats) of the effects and of the free geometry of a model.
 fn penalty_nats(m: &Model, data: &FitData) -> f64 {
     let geometry = usize::from(m.free.surface) + if m.free.thickness { m.layers() } else { 0 };
     let out_of_tolerance = usize::from((0..m.layers()).any(|l| m.thickness_out_of_tolerance(l)));
@@ -33,7 +33,7 @@ fn penalised_nats(f: &Fit, data: &FitData) -> f64 {
     f.nats() + penalty_nats(&f.model, data)
 }
 
-/// A model with its geometry at the prior, except for what stays free.
+/// The model with its geometry at the prior, except for the free part.
 fn with_fixed_geometry(model: &Model, free: FreeParameters) -> Model {
     let mut m = Model { free, ..model.clone() };
     if !free.surface {
@@ -48,7 +48,7 @@ fn with_fixed_geometry(model: &Model, free: FreeParameters) -> Model {
     m
 }
 
-/// Fixes the geometry that agrees with the prior; returns whether an effect was added for it.
+/// Fixes the geometry that agrees with the prior; returns whether an effect was added that explains a deviation.
 pub fn fix_geometry(search: &mut Search, prepared: &PreparedRecordings) -> bool {
     let best = &search.best;
     if best.model.assumed.is_geometry_guessed() {
@@ -74,7 +74,7 @@ pub fn fix_geometry(search: &mut Search, prepared: &PreparedRecordings) -> bool 
     let fits: Vec<Fit> = tried
         .into_par_iter()
         .filter_map(|m| {
-            // Ruptures where the assumed boundaries put them, not where the free ones had them.
+            // Rupture times for the assumed boundaries instead of the free ones.
             let start = with_updated_times(m, &search.data, &times);
             let first = fit(&start, &search.data, Effort::SHORT)?;
             let model = with_updated_times(first.model, &search.data, &times);
@@ -106,7 +106,7 @@ pub fn fix_geometry(search: &mut Search, prepared: &PreparedRecordings) -> bool 
     effect_added
 }
 
-/// With an identified boundary shift the base law must keep its thicknesses within their tolerances.
+/// Refits the base law with thicknesses within their tolerances, after a boundary shift was identified.
 fn constrain_base_law(search: &mut Search, prepared: &PreparedRecordings) {
     let mut model = search.base.model.clone();
     model.free.wide_thickness = false;
@@ -116,14 +116,14 @@ fn constrain_base_law(search: &mut Search, prepared: &PreparedRecordings) {
     }
 }
 
-/// Whether the penalised gain of a geometry effect also holds under its own noise.
+/// Whether the gain of a geometry effect exceeds its penalty also under the noise of the larger model.
 fn pays_under_own_noise(f: &Fit, reference: &Fit, data: &FitData) -> bool {
     likelihood_gain(reference, f, data)
         .exceeds(penalty_nats(&f.model, data) - penalty_nats(&reference.model, data))
 }
 
-/// A model with uncertain geometry: intervals that assume exactly known boundaries would be too narrow. Where an effect
-/// moves boundaries they stay fixed, because nothing else determines it.
+/// The model with free geometry for confidence intervals, which would be too narrow with known boundaries. With an effect that moves
+/// boundaries they stay fixed, because the effect would not be identifiable.
 #[must_use]
 pub fn free_geometry(model: &Model) -> Model {
     let moves =
@@ -135,14 +135,13 @@ pub fn free_geometry(model: &Model) -> Model {
     m
 }
 
-/// Models in which one boundary is shifted, for thicknesses outside their tolerances; the rest takes its most probable
-/// value.
+/// Models with one boundary shifted, for thicknesses outside their tolerances; the shift has its most probable value.
 fn boundary_shift_models(model: &Model) -> Vec<Model> {
     let out_of_tolerance = |l: usize| model.thickness_out_of_tolerance(l);
     let included = |i: &EffectInfo| model.effects.iter().any(|e| e.info.id == i.id);
     let moves = |i: &&EffectInfo| matches!(i.proposal, Proposal::LayerFaces(_)) && !included(i);
     let (prior, layers) = (&model.assumed, &model.tissue.layers);
-    // Deviation from the prior in m, and its weight.
+    // Deviation from the prior in m, and its precision.
     let deviation = |l: usize| {
         let assumed = prior.tissue.layers[l].thickness_m;
         let sd = (prior.thickness_tolerance[l] * assumed).max(1e-9);
@@ -169,14 +168,13 @@ fn boundary_shift_models(model: &Model) -> Vec<Model> {
     out
 }
 
-/// Whether the needle passed the last boundary in any recording, so that its thickness is determined.
+/// Whether the needle passed the last boundary in any recording, so that the last thickness is determined.
 fn passed_last_boundary(model: &Model, data: &FitData) -> bool {
     let end = model.tissue.surface_m + model.tissue.layers.iter().map(|l| l.thickness_m).sum::<f64>();
     data.recordings.iter().any(|b| b.start_s.iter().any(|t| b.motion.at(*t).0 > end))
 }
 
-/// Stiffness and friction for positions scaled by `1 + eps`. A fit that starts at the values of the unscaled positions
-/// may not converge.
+/// Scales stiffness and friction for positions scaled by `1 + eps`; a fit from the unscaled values may not converge.
 fn with_scaled_coefficients(model: &Model, choice: &EffectTerm) -> Model {
     let mut m = model.clone();
     if choice.info.stage == ChainStage::Position {
@@ -189,8 +187,8 @@ fn with_scaled_coefficients(model: &Model, choice: &EffectTerm) -> Model {
     m
 }
 
-/// Effects that would move the boundaries as the free geometry did; the last thickness counts when its boundary was
-/// passed. Two thicknesses identify a shift only outside their tolerances, and never a scale.
+/// Effects that explain the deviations of the free thicknesses; the last thickness counts if its boundary was passed. Two thicknesses
+/// identify a shift only outside their tolerances, and never a scale.
 fn geometry_effects(model: &Model, passed_last_boundary: bool) -> Vec<EffectTerm> {
     let assumed = &model.assumed.tissue.layers;
     let deviation_m: Vec<f64> =

@@ -1,4 +1,4 @@
-//! Prediction of held-out recordings, and the jackknife of effect strengths.
+//! Predicts held-out recordings, and estimates effect strengths by the jackknife.
 
 use crate::varying_coefficient_test::varying_coefficient_test;
 use stylet_identify::fit::{Effort, Fit, fit};
@@ -7,16 +7,15 @@ use stylet_identify::model::{Model, NO_RUPTURE, RecordingParameters};
 use stylet_identify::score_test::ScoreTest;
 use stylet_stats::parallel::*;
 
-/// Shift (samples) by which a predicted rupture may be moved to fit best: its phase within a sample is not an error.
+/// Largest shift (samples) of a predicted rupture to its best fit: the phase within a sampling interval is not an error.
 const RUPTURE_SHIFT_SAMPLES: f64 = 2.0;
 
-/// Residual of a free-run prediction of one recording: ruptures where the model predicts them.
+/// Residual of a free-run prediction of one recording, with ruptures at predicted times.
 #[derive(Clone, Debug, Default)]
 pub struct FreeRunResidual {
     /// Mean square in N² over the compared blocks.
     pub mean_square_n2: f64,
-    /// The same with ruptures, surface and friction of the recording as observed: what remains when the scatter between
-    /// recordings is known.
+    /// The same given the observed ruptures, surface and friction of the recording: the error without scatter between recordings.
     pub given_scatter_n2: f64,
     /// Number of compared blocks.
     pub compared_blocks: usize,
@@ -26,7 +25,7 @@ pub struct FreeRunResidual {
     pub rupture_times_s: Vec<f64>,
 }
 
-/// Free-run prediction of recording `r`; each predicted rupture is shifted by up to two samples to fit best.
+/// Free-run prediction of recording `r`; each predicted rupture is shifted by at most two samples to its best fit.
 #[must_use]
 pub fn predict_free_run(model: &Model, data: &FitData, r: usize) -> Option<FreeRunResidual> {
     let mut cache = ReplayCache::new(model, data, r)?;
@@ -64,14 +63,14 @@ pub fn predict_free_run(model: &Model, data: &FitData, r: usize) -> Option<FreeR
     })
 }
 
-/// Predicts every recording from a fit to the others; with a single recording the fit itself is used.
+/// Predicts every recording from a fit to the others; a single recording is predicted by its own fit.
 #[must_use]
 pub fn held_out_residuals(best: &Fit, data: &FitData) -> Vec<Option<FreeRunResidual>> {
     held_out_residuals_with(best, data, |_| RecordingParameters::default())
 }
 
-/// As [`held_out_residuals`], but with the random effects (surface, friction) of the held-out recording known: the gain
-/// of a cause should not depend on where the needle touched.
+/// As [`held_out_residuals`], but with the random effects (surface, friction) of the held-out recording known, so that the gain of a cause
+/// does not depend on where the needle touched.
 #[must_use]
 pub fn held_out_residuals_with_random_effects(best: &Fit, data: &FitData) -> Vec<Option<FreeRunResidual>> {
     held_out_residuals_with(best, data, |r| best.model.per_recording[r])
@@ -114,15 +113,14 @@ fn mean_square(residual_n: &[f64], data: &FitData, r: usize) -> f64 {
     square / f64::max(count, 1.0)
 }
 
-/// Leave-one-recording-out results of one effect.
+/// Leave-one-recording-out results for one effect.
 #[derive(Clone, Debug)]
 pub struct JackknifeResult {
-    /// Jackknife standard error of its strengths, relative to them; the largest.
+    /// Largest jackknife standard error of its strengths, relative to them.
     pub relative_se: f64,
-    /// Share of the held-out mean square beyond the noise that the effect removes.
+    /// Share of the held-out mean square above the noise that the effect removes.
     pub held_out_gain: f64,
-    /// Gain of the varying-coefficient test as a share of the loss without the effect
-    /// ([`varying_coefficient_test`](crate::varying_coefficient_test)).
+    /// Gain of the [`varying_coefficient_test`](crate::varying_coefficient_test) as a share of the loss without the effect.
     pub varying_coefficient_share: f64,
 }
 
@@ -177,7 +175,7 @@ pub fn jackknife_effects(best: &Fit, data: &FitData, floor_n: f64) -> Vec<Jackkn
         .collect()
 }
 
-/// The model fitted to all recordings but `r`, whose random effects are zero.
+/// The model fitted to all recordings except `r`; the random effects of `r` are zero.
 fn refit_without(best: &Fit, data: &FitData, r: usize) -> Option<Model> {
     let others: Vec<usize> = (0..data.recording_count()).filter(|k| *k != r).collect();
     let mut model = best.model.clone();
@@ -194,13 +192,13 @@ fn refit_without(best: &Fit, data: &FitData, r: usize) -> Option<Model> {
     Some(model)
 }
 
-/// RMS in N over recordings, including the noise of samples within their blocks.
+/// RMS residual (N) over all recordings, including the noise of samples within their blocks.
 #[must_use]
 pub fn pooled_rms(residuals: &[Option<FreeRunResidual>], data: &FitData) -> f64 {
     pooled_rms_of(residuals, data, |l| l.mean_square_n2)
 }
 
-/// The same with the scatter between recordings known.
+/// The same given the scatter between recordings.
 #[must_use]
 pub fn pooled_rms_given_scatter(residuals: &[Option<FreeRunResidual>], data: &FitData) -> f64 {
     pooled_rms_of(residuals, data, |l| l.given_scatter_n2)

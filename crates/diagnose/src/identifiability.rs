@@ -1,4 +1,4 @@
-//! Identifiability: effects whose signature is absorbed by the fitted parameters, and motions that would reveal them.
+//! Identifiability: effects whose signature the fitted parameters absorb, and motions that would make them identifiable.
 
 use crate::check_json::EffectVisibility;
 use crate::diagnosis_json::Cause;
@@ -13,20 +13,20 @@ use stylet_identify::score_test::{ScoreTest, scale_strengths};
 use stylet_stats::parallel::*;
 use stylet_tissue::{ChainStage, EffectInfo, FitScale, Proposal};
 
-/// Nats that the search requires of an effect with two parameters, about.
+/// Approximate gain (nats) that the search requires of an effect with two parameters.
 const REQUIRED_NATS: f64 = 12.0;
-/// Nats from which an effect is named in most cases: a gain, a significant strength and a better prediction of held-out recordings are
-/// required of it together.
+/// Expected gain (nats) from which an effect is identified in most cases. It exceeds the required gain because strength and held-out
+/// improvement must be significant, too.
 const SEEN_NATS: f64 = 100.0;
 /// Largest multiple of an effect's typical size that is plausible.
 const MAX_PLAUSIBLE_FACTOR: f64 = 30.0;
-/// Steps to the size with wanted nats.
+/// Iterations of the size for a given gain, which grows about with its square.
 const SIZE_STEPS: usize = 3;
 
-/// From which size on each effect that a fit does not contain would be seen beside it; without the effects that have no column to test.
+/// Detectable size of each effect that a fit does not contain; effects without a column to test are omitted.
 ///
-/// The geometry is free and the priors about the parameters of the layers are weak: what follows from their tolerance alone is no
-/// evidence. Effects that resemble each other are not distinguished here; the diagnosis lists them as equivalent.
+/// The geometry is free and the priors on layer parameters are weak, because what follows from their tolerance alone is no evidence.
+/// Effects that resemble each other are not distinguished here; the diagnosis lists them as equivalent.
 #[must_use]
 pub fn visible_effects(best: &Fit, data: &FitData) -> Vec<EffectVisibility> {
     let mut model = free_geometry(&best.model);
@@ -65,7 +65,7 @@ fn visibility(info: &'static EffectInfo, score_test: &ScoreTest) -> Option<Effec
     })
 }
 
-/// Effects that are not identifiable from these recordings, in the order of the library; `visible` are those with a column to test.
+/// Effects that are not identifiable from these recordings, in the order of the library; `visible` contains those with a column to test.
 #[must_use]
 pub fn not_identifiable(best: &Fit, data: &FitData, visible: &[EffectVisibility]) -> Vec<String> {
     let is_identifiable = |info: &EffectInfo| match visible.iter().find(|v| v.effect == info.id) {
@@ -77,8 +77,8 @@ pub fn not_identifiable(best: &Fit, data: &FitData, visible: &[EffectVisibility]
     missing_effects(best).filter(|info| !is_identifiable(info)).map(|i| i.id.to_owned()).collect()
 }
 
-/// Parameters of an effect at its typical size, and the nats that it would gain; the largest over its shapes. `None` for an effect
-/// without a column to test.
+/// Parameters of an effect at its typical size, and its expected gain (nats), the largest over its shapes. `None` for an effect without a
+/// column to test.
 fn typical_size(info: &'static EffectInfo, score_test: &ScoreTest) -> Option<(Vec<f64>, f64)> {
     let start = || info.parameters.iter().map(|p| p.start).collect::<Vec<f64>>();
     let typical = |group: &[&[f64]]| -> Vec<f64> {
@@ -95,7 +95,7 @@ fn typical_size(info: &'static EffectInfo, score_test: &ScoreTest) -> Option<(Ve
             return None;
         }
     };
-    // At a multiple of the commanded motion a clock shows nothing of its own.
+    // At a multiple of the commanded motion, a periodic effect is not identifiable.
     let is_hidden = has_clock(info) && common_motion_period_s(score_test.data).is_some();
     let gain = |values: Vec<f64>| {
         let column = score_test.effect_column(&EffectTerm::new(info, &values))?;
@@ -110,7 +110,7 @@ fn has_clock(info: &EffectInfo) -> bool {
     info.parameters.iter().any(|p| p.clock)
 }
 
-/// Advice on motions that would separate equivalent effects or reveal hidden ones.
+/// Advice on motions that would distinguish equivalent effects or make effects identifiable.
 #[must_use]
 pub fn advice(causes: &[Cause], not_identifiable: &[String], motion_period_s: Option<f64>) -> Vec<String> {
     let mut advice = Vec::new();

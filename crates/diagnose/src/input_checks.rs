@@ -1,4 +1,4 @@
-//! Plausibility checks of recordings against the scenario: length, reach, units and signs.
+//! Checks recordings for plausibility against the scenario (length, reach, units, signs), and cleans them.
 
 use crate::error::DiagnoseError;
 use stylet_record::sensor_artefacts::{SensorArtefacts, find_sensor_artefacts};
@@ -17,9 +17,9 @@ pub struct NamedRecording {
     pub notes: Vec<QualityNote>,
 }
 
-/// Recordings for the engine.
+/// Recordings ready for the fit.
 pub(crate) struct CleanRecordings {
-    /// Recordings without samples that are not finite.
+    /// Recordings without non-finite samples.
     pub recordings: Vec<Recording>,
     /// Notes on each recording.
     pub notes: Vec<Vec<QualityNote>>,
@@ -27,13 +27,12 @@ pub(crate) struct CleanRecordings {
     pub raw: SensorArtefacts,
 }
 
-/// Upper limit of layers: as many were distinguished in simulated cases with clean data.
+/// Largest number of layers; as many were distinguished in simulated cases with clean data.
 const MAX_LAYERS: usize = 40;
 
-/// Recordings needed to call one of them an outlier.
+/// Smallest number of recordings in which one can be an outlier.
 const MIN_RECORDINGS_FOR_OUTLIER: usize = 3;
-/// A recording is an outlier when its force ratio (measured over expected force) is more than this factor above or
-/// below the median of the others.
+/// Factor by which the force ratio (measured over expected force) of an outlier differs from the median of the others.
 const OUTLIER_FORCE_FACTOR: f64 = 2.0;
 
 /// Checks that there are recordings with enough usable samples.
@@ -52,7 +51,7 @@ pub(crate) fn check_length(recordings: &[NamedRecording]) -> Result<(), Diagnose
 
 /// Checks length, reach, units and signs of all recordings.
 ///
-/// Returns each recording's force ratio, measured over expected force; `None` where the two do not correlate.
+/// Returns the force ratio of each recording, measured over expected force; `None` if both do not correlate.
 pub(crate) fn check_recordings(
     scenario: &Scenario,
     recordings: &[NamedRecording],
@@ -71,7 +70,7 @@ pub(crate) fn check_recordings(
         let deepest_m = usable.iter().fold(f64::NEG_INFINITY, |m, &i| m.max(r.position_m[i]));
         let lowest_m = usable.iter().fold(f64::INFINITY, |m, &i| m.min(r.position_m[i]));
         let depth_m = end_m - surface_m;
-        // The smallest useful depth: a hundredth of the first layer.
+        // Smallest useful depth: a hundredth of the first layer.
         let first_m = scenario.tissue.layers.first().map_or(depth_m, |l| l.thickness_m);
         if lowest_m >= end_m && deepest_m - lowest_m <= 20.0 * depth_m {
             let offset_m = surface_m - lowest_m;
@@ -109,11 +108,10 @@ const TIME_UNITS: [(&str, &str, f64); 5] = [
     ("hours", "3600", 3600.0),
     ("centiseconds", "0.01", 0.01),
 ];
-/// Duration and speed of the scenario's motion and of a recording agree within this factor.
+/// Largest ratio of duration and speed between the scenario's motion and a recording of it.
 const SAME_MOTION_FACTOR: f64 = 1.25;
 
-/// Refuses a time in another unit than seconds: duration and speed are those of the scenario's motion in that unit, and
-/// neither is in seconds.
+/// Returns an error if duration and speed agree with the scenario's motion in another unit of time and not in seconds.
 fn check_time_unit(scenario: &Scenario, e: &NamedRecording, usable: &[usize]) -> Result<(), DiagnoseError> {
     let r = &e.recording;
     let (Some(&first), Some(&last)) = (usable.first(), usable.last()) else { return Ok(()) };
@@ -131,7 +129,7 @@ fn check_time_unit(scenario: &Scenario, e: &NamedRecording, usable: &[usize]) ->
         });
     };
     let path_m: f64 = usable.windows(2).map(|w| (r.position_m[w[1]] - r.position_m[w[0]]).abs()).sum();
-    /// Times at which the planned motion is sampled.
+    /// Number of times at which the planned motion is sampled.
     const POINTS: usize = 2000;
     let (mut planned_path_m, mut before) = (0.0, None);
     for k in 0..=POINTS {
@@ -151,16 +149,16 @@ fn check_time_unit(scenario: &Scenario, e: &NamedRecording, usable: &[usize]) ->
     }
 }
 
-/// A unit of time longer than the second in which the expected force has the measured size, when it is far larger in
-/// seconds and the needle is faster than a robot inserts it.
+/// Unit of time longer than a second that explains a force far below the expected one, for a needle faster than usual in seconds: in that
+/// unit, the expected force has the measured size.
 fn force_in_other_unit(
     scenario: &Scenario,
     r: &Recording,
     usable: &[usize],
 ) -> Option<(&'static str, &'static str)> {
-    /// Speed in m/s above which insertions are rare.
+    /// Median speed (m/s) above which insertions by a robot are rare.
     const FAST_MPS: f64 = 0.05;
-    /// Ratio of measured to expected force in seconds, at most.
+    /// Largest ratio of measured to expected force in seconds for a wrong unit.
     const MAX_RATIO: f64 = 1.0 / 3.0;
     let speeds = usable.iter().map(|&i| r.velocity_mps[i].abs());
     if stylet_stats::order_statistics::median_of(speeds) < FAST_MPS {
@@ -175,7 +173,7 @@ fn force_in_other_unit(
     (ratio < MAX_RATIO).then_some((unit.0, unit.1))
 }
 
-/// A note for each recording whose force ratio (see [`check_recordings`]) differs from that of the others.
+/// A note for each recording whose force ratio ([`check_recordings`]) differs from that of the others.
 pub(crate) fn force_outlier_notes(ratios: &[Option<f64>]) -> Vec<Option<QualityNote>> {
     let note = |i: usize| {
         let ratio = ratios[i]?;
@@ -203,8 +201,7 @@ pub(crate) fn force_outlier_notes(ratios: &[Option<f64>]) -> Vec<Option<QualityN
     (0..ratios.len()).map(note).collect()
 }
 
-/// Force ratio of one recording: size of the measured force over that of the assumed model; `None` where the two do not
-/// correlate.
+/// Force ratio of one recording: size of the measured force over that of the assumed model; `None` if both do not correlate.
 fn force_ratio_of(
     scenario: &Scenario,
     e: &NamedRecording,
@@ -235,7 +232,7 @@ fn force_ratio_of(
     Ok((correlation > 0.5).then_some(ratio))
 }
 
-/// Size of the measured force over that of the assumed model, and their correlation, when the time is in units of `unit_s`.
+/// Size of the measured force over that of the assumed model, and their correlation, for time in units of `unit_s`.
 fn force_ratio_in_unit(
     scenario: &Scenario,
     r: &Recording,
@@ -268,7 +265,7 @@ fn is_finite_sample(r: &Recording, i: usize) -> bool {
     [&r.time_s, &r.position_m, &r.velocity_mps, &r.force_n].iter().all(|x| x[i].is_finite())
 }
 
-/// Assesses recordings and removes samples that are not finite.
+/// Assesses the quality of recordings and removes non-finite samples.
 pub(crate) fn clean_recordings(named: &[NamedRecording]) -> CleanRecordings {
     let mut notes: Vec<Vec<QualityNote>> = Vec::new();
     let mut recordings: Vec<Recording> = Vec::new();
@@ -289,7 +286,7 @@ pub(crate) fn clean_recordings(named: &[NamedRecording]) -> CleanRecordings {
     CleanRecordings { recordings, notes, raw }
 }
 
-/// The recording without samples that are not finite.
+/// The recording without non-finite samples.
 pub(crate) fn drop_non_finite(r: &Recording) -> Recording {
     let kept: Vec<usize> = (0..r.len()).filter(|i| is_finite_sample(r, *i)).collect();
     if kept.len() == r.len() {
@@ -306,7 +303,7 @@ pub(crate) fn drop_non_finite(r: &Recording) -> Recording {
     }
 }
 
-/// A note on samples that are not finite and were removed.
+/// A note on non-finite samples, which were removed.
 pub(crate) fn non_finite_note(r: &Recording) -> Option<QualityNote> {
     let bad: Vec<usize> = (0..r.len()).filter(|i| !is_finite_sample(r, *i)).collect();
     let first = *bad.first()?;

@@ -1,4 +1,4 @@
-//! The number of layers, from the recordings: without a scenario, and where they contradict the scenario's.
+//! Determines the number of layers from the recordings, without a scenario or where they contradict it.
 
 use crate::claims;
 use crate::diagnose::{DiagnosisResult, Options, diagnose_given_layers};
@@ -10,10 +10,10 @@ use stylet_identify::model::Assumptions;
 use stylet_scenario::{Motion, Scenario};
 use stylet_score::MIN_FORCE_SHARE;
 
-/// Finds the layers that recordings show, `layers` of them or as many as there are, and diagnoses what is left: the scenario that
-/// the diagnosis started from, under weak priors, and the diagnosis.
+/// Finds the layers that recordings show (`layers` of them, or all) and diagnoses the recordings with them under weak priors. Returns the
+/// scenario at the start and the diagnosis.
 ///
-/// A last layer that turns out to bear no force is the space behind the tissue; the diagnosis is repeated without it.
+/// Without `layers`, a last layer without elastic force is the space behind the tissue, and the diagnosis is repeated without it.
 ///
 /// # Errors
 /// [`DiagnoseError`] when a recording is too short, none has a contact, or fewer than `layers` are found.
@@ -33,8 +33,8 @@ pub fn identify(
     diagnose_without_empty_layer(scenario, recordings, options, &mut progress)
 }
 
-/// Compares recordings with the prediction of a scenario. Where the result is contradicted and another number of layers, as the
-/// recordings show it, gives one that is not, that one stands, with a finding.
+/// Compares recordings with the prediction of a scenario. If findings contradict the result, the diagnosis is repeated with the number of
+/// layers in the recordings; that result is returned, with a finding, if no finding contradicts it.
 ///
 /// # Errors
 /// [`DiagnoseError`] when the recordings do not fit the scenario.
@@ -52,7 +52,7 @@ pub fn diagnose(
     if !is_contradicted(&result.diagnosis) {
         return Ok(result);
     }
-    // Even where as many layers are found, the last of them may turn out to be empty.
+    // Of an equal number of layers, the last may still turn out to be empty.
     let is_other = |found: &Scenario| {
         found.tissue.layers.len() != assumed || result.diagnosis.verdict != Verdict::Unknown
     };
@@ -66,7 +66,7 @@ pub fn diagnose(
         thickness_tolerance: found.thickness_tolerance,
         ..scenario.clone()
     };
-    // What cannot be diagnosed with other layers is no reason to lose the result.
+    // If the diagnosis with other layers fails, the first result remains valid.
     let Ok((start, mut other)) = diagnose_without_empty_layer(start, recordings, options, &mut progress)
     else {
         return Ok(result);
@@ -88,7 +88,7 @@ pub fn diagnose(
     Ok(other)
 }
 
-/// Diagnoses, and again without the last layer as long as that bears no force.
+/// Diagnoses, and repeats the diagnosis without the last layer as long as that carries no force.
 fn diagnose_without_empty_layer(
     mut scenario: Scenario,
     recordings: &[NamedRecording],
@@ -119,8 +119,7 @@ fn bears_force(result: &DiagnosisResult, recordings: &[NamedRecording]) -> bool 
     tissue.layers[last].stiffness_n_per_m * depth_m > MIN_FORCE_SHARE * over_all(|r| &r.recording.force_n)
 }
 
-/// A scenario with the layers that the recordings show, `layers` of them or as many as there are, and weak priors about their
-/// numbers.
+/// A scenario with the layers that recordings show (`layers` of them, or all), and weak priors on their parameters.
 ///
 /// # Errors
 /// [`DiagnoseError`] when a recording is too short, none has a contact, or fewer than `layers` are found.

@@ -1,21 +1,21 @@
-//! Diagnosis of measured insertions: which effects a scenario lacks, how strong they are, and how much better it predicts with them.
+//! Diagnosis of measured insertions: which effects a scenario lacks, their parameters, and the improvement of its predictions with them.
 //!
-//! [`diagnose()`] compares recordings with a scenario. The steps, in the order of the data flow:
+//! [`diagnose()`] compares recordings with a scenario. Its modules in the order of the data flow:
 //!
 //! | module | contents |
 //! |---|---|
 //! | `input_checks` | units, signs and reach of the recordings |
-//! | [`base_law_fit`], [`random_effect_selection`] | fit of the base law and of what differs between recordings |
-//! | `baseline_search`, `zero_steps` | offset, drift, force linear in position, steps of the zero: before all other effects |
+//! | [`base_law_fit`], [`random_effect_selection`] | fit of the base law and of random effects |
+//! | `baseline_search`, `zero_steps` | sensor baseline: offset, drift, force linear in position, steps of the zero |
 //! | [`effect_start_values`], [`tone_detection`] | first-order gain and start values of every effect |
 //! | [`effect_selection`], [`model_comparison`] | forward selection by penalised gain, and pruning |
-//! | `motion_period` | causes with a clock that the commanded motion hides |
+//! | `motion_period` | periodic causes that the commanded motion hides |
 //! | [`geometry_selection`] | fixed or free layer boundaries, position scale, shifted boundaries |
 //! | [`reweighted_fit`], [`varying_coefficient_test`] | robustness against unmodelled effects |
 //! | [`competing_effects`] | effects that explain the data equally well |
-//! | [`confidence_intervals`] | intervals of all parameters |
-//! | [`residual_tests`] | structure in the residual: the verdict `unknown` |
-//! | [`held_out`], [`negligible_effects`] | improvement on held-out recordings, and effects too small to matter |
+//! | [`confidence_intervals`] | confidence intervals of all parameters |
+//! | [`residual_tests`] | tests for structure in the residual: the verdict `unknown` |
+//! | [`held_out`], [`negligible_effects`] | improvement on held-out recordings, and negligible effects |
 //! | [`prediction`] | predictions of new recordings |
 //! | [`diagnosis_json`], [`report_curves`] | results, and the data for the report |
 #![forbid(unsafe_code)]

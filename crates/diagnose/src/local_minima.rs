@@ -1,4 +1,4 @@
-//! Escape from local minima of the objective: candidates with a shifted layer boundary or another breaking force.
+//! Escapes from local minima of the objective by trying shifted layer boundaries and other breaking forces.
 
 use crate::base_law_fit::{with_noise_of, with_updated_times};
 use crate::model_comparison::MIN_GAIN_NATS;
@@ -9,20 +9,20 @@ use stylet_identify::model::{EffectTerm, Model};
 use stylet_stats::parallel::*;
 use stylet_tissue::Proposal;
 
-/// Shifts of a layer boundary that are tried, in tolerances of the thickness.
+/// Trial shifts of a layer boundary, in tolerances of the thinner prior of both thicknesses.
 const BOUNDARY_SHIFTS: [f64; 4] = [-2.0, -1.0, 1.0, 2.0];
-/// Factor by which the strength of a breaking element is varied up and down.
+/// Largest factor by which the breaking force is varied, up and down.
 const STRENGTH_FACTOR: f64 = 3.0;
-/// Steps of the strength variation with fixed rupture times.
+/// Steps of that variation in each direction with fixed rupture times.
 const FIXED_TIME_STEPS: i32 = 40;
-/// Steps of the strength variation with updated rupture times.
+/// Steps of that variation in each direction with updated rupture times, which cost more.
 const UPDATED_TIME_STEPS: i32 = 10;
-/// Local minima of the strength variation from which a fit starts.
+/// Number of local minima of that variation from which a fit starts.
 const MAX_MINIMA: usize = 5;
 
 impl Search {
-    /// The leader with one layer boundary moved, when it leaves more than noise and the move is better. A boundary that
-    /// was fitted to the ruptures of an incomplete model does not return by small steps.
+    /// The leading candidate with one layer boundary shifted, if it leaves structure and the shift improves it. A boundary that was fitted
+    /// to the ruptures of an incomplete model is in a local minimum.
     pub(crate) fn with_boundary_moved(
         &self,
         leader: &Fit,
@@ -49,8 +49,8 @@ impl Search {
         self.full_fit_below(likeliest.model, times, leader.nats() - MIN_GAIN_NATS)
     }
 
-    /// The leader with its breaking element at another strength, when that is better. A reversal before the break and
-    /// one after it give two local minima, and fitted rupture times hold the fit in the wrong one.
+    /// The leading candidate with another breaking force, if that improves it. With a reversal of the motion the break can lie before or
+    /// after it, which gives two local minima, and fitted rupture times keep the fit in one of them.
     pub(crate) fn with_other_strength(
         &self,
         leader: &Fit,
@@ -60,7 +60,7 @@ impl Search {
         let last = leader.model.effects.last().filter(|e| e.info.proposal == Proposal::MembraneRupture)?;
         let coarse = with_noise_of(&leader.model, coarse)?;
         let rest = leader.model.without_effect(leader.model.effects.len() - 1);
-        // All local minima along the strength: finely with fixed rupture times, coarsely with updated ones.
+        // Local minima along the breaking force: fine with fixed rupture times, coarse with updated ones.
         let along = |steps: i32, update: bool| -> Vec<(f64, Model)> {
             let at = |choice: EffectTerm| {
                 let model = rest.with_effect(choice);
@@ -91,19 +91,19 @@ impl Search {
         fitted.into_iter().min_by(|a, b| a.nats().total_cmp(&b.nats()))
     }
 
-    /// Full fit with updated rupture times, when its objective falls below `wanted` nats.
+    /// Full fit with updated rupture times; `None` if its objective does not fall below `wanted` nats.
     fn full_fit_below(&self, model: Model, times: &[Vec<f64>], wanted: f64) -> Option<Fit> {
         let model = with_updated_times(model, &self.data, times);
         fit_if_below(&model, &self.data, Effort::FULL, wanted).filter(|f| f.nats() < wanted)
     }
 }
 
-/// Index of the parameter that is the breaking force of an effect.
+/// Index of the breaking force among the parameters of an effect.
 fn breaking_force_index(at: &EffectTerm) -> Option<usize> {
     at.info.parameters.iter().position(|p| p.unit == "N")
 }
 
-/// The effect with lower and higher breaking forces, in order.
+/// The effect with lower and higher breaking forces, in ascending order.
 fn breaking_force_variations(at: &EffectTerm, steps: i32) -> Vec<EffectTerm> {
     let index = breaking_force_index(at);
     let with = |k: i32| {

@@ -1,20 +1,19 @@
-//! Mains hum by its frequency, also when sampling folds it to another one.
+//! Identifies mains hum by its frequency, including aliased frequencies.
 
 /// Mains frequencies in Hz.
 const MAINS_HZ: [f64; 2] = [50.0, 60.0];
-/// Largest harmonic that is recognised: rectifiers and drives emit little power above it.
+/// Largest harmonic that is identified: rectifiers and drives emit little power above it.
 const MAX_HARMONIC: u32 = 5;
-/// Deviation of the mains from its nominal frequency in Hz, per harmonic.
+/// Largest deviation (Hz) of the mains from its nominal frequency, per harmonic.
 const MAINS_DEVIATION_HZ: f64 = 0.15;
 
-/// Frequency (Hz) at which a tone of `hz` appears at this sampling rate.
+/// Apparent frequency (Hz) of a tone of `hz` sampled at `sample_hz`.
 #[must_use]
 pub fn aliased_hz(hz: f64, sample_hz: f64) -> f64 {
     (hz - sample_hz * (hz / sample_hz).round()).abs()
 }
 
-/// What is known about a tone at `hz` in samples at `sample_hz`, resolved to `resolution_hz`: the mains harmonic of lowest
-/// order that appears there.
+/// Remark on a tone at `hz` in samples at `sample_hz`, resolved to `resolution_hz`: the lowest mains harmonic that appears there, if any.
 #[must_use]
 pub fn mains_remark(hz: f64, sample_hz: f64, resolution_hz: f64) -> Option<String> {
     (1..=MAX_HARMONIC).find_map(|harmonic| {

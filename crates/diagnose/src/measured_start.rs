@@ -1,4 +1,4 @@
-//! Starting values from the data, for scenarios whose numbers are a rough guess.
+//! Chooses between start values from the scenario and start values from the data, for scenarios whose parameters are a rough guess.
 
 use crate::base_law_fit::{PreparedRecordings, fit_base_law, refit_with_random_effects};
 use crate::baseline_search::{leaves_noise, search_with_baseline};
@@ -11,19 +11,21 @@ use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{Assumptions, MAX_TOLERANCES_WIDE};
 use stylet_record::Recording;
 
-/// Smallest value of a parameter, as a share of the assumed one: none of them is zero.
+/// Lower bound of a parameter found in the data, as a share of the assumed one, so that none is zero.
 const MIN_SHARE_OF_ASSUMED: f64 = 1e-3;
-/// A fit that leaves a residual smaller by this factor is better, even if it does not explain the force.
+/// Ratio of RMS residuals from which one fit is better, even if it leaves structure.
 const BETTER_FACTOR: f64 = 2.0;
 
-/// The search for effects from the assumed numbers, or from those in the data.
+/// Searches for effects from the assumed parameters (A), from parameters found in the data (D), or from both. `None` when the model cannot
+/// be replayed.
 ///
-/// Numbers in the data are considered where the assumed ones leave more than noise and differ by more than their tolerance, unless they
-/// fit far worse. They come first where they need no effect, fit far better, or fit better while the fit from the assumed numbers
-/// leaves the tolerance. The first search stands if it explains the force: from the assumed numbers by numbers inside the tolerance,
-/// from the data by numbers outside it and at most one effect. Of two searches the one that explains the force stands, of two that do
-/// the one with fewer effects.
-/// `None` when the model cannot be replayed.
+/// 1. Only A is searched if its base law leaves only noise, if no layers are found in the data, if the base law from D is within
+///    tolerance of A, or if its RMS residual is larger by [`BETTER_FACTOR`].
+/// 2. D is searched first if its base law leaves only noise, if its RMS residual is smaller by [`BETTER_FACTOR`], or if it is smaller at
+///    all and the fit from A is out of tolerance. Otherwise A is first.
+/// 3. The first search is returned if it leaves only noise and is within tolerance (A), or out of tolerance with at most one effect (D).
+/// 4. Otherwise both are searched. The one that leaves only noise is returned; of two, the one with fewer effects (if equal: A, unless it
+///    is out of tolerance); of none, A, unless the RMS residual of D is smaller by [`BETTER_FACTOR`].
 pub(crate) fn search_from_any_start(
     prepared: PreparedRecordings,
     recordings: &[Recording],
@@ -62,7 +64,7 @@ pub(crate) fn search_from_any_start(
     Some(if is_data_better { data } else { assumed })
 }
 
-/// The search from a fit of the base law, with the recordings it was fitted to.
+/// Selects random effects and searches for effects from a fit of the base law; returns the search and the recordings it was fitted to.
 fn search(
     prepared: &PreparedRecordings,
     base: Fit,
@@ -74,7 +76,7 @@ fn search(
     search_with_baseline(prepared, base, data, progress)
 }
 
-/// The base law fitted from the layers in the data; `None` where that gives the assumed numbers.
+/// The base law fitted from the layers found in the data; `None` if there are none, or if it is within tolerance of the assumed parameters.
 fn fit_from_data(
     prepared: &PreparedRecordings,
     recordings: &[Recording],
@@ -86,8 +88,8 @@ fn fit_from_data(
     is_out_of_tolerance(&prepared.assumed, &fit).then_some((measured, fit, data))
 }
 
-/// Whether a fitted surface, stiffness, friction or puncture force is outside the tolerance of the assumed one, or a thickness outside
-/// the bounds of a fit from the assumed one.
+/// Whether a fitted surface, stiffness, friction or puncture force is outside the tolerance of the assumed one, or a thickness outside the
+/// bounds of a fit from the assumed one.
 fn is_out_of_tolerance(assumed: &Assumptions, fit: &Fit) -> bool {
     let moved_m = (assumed.tissue.surface_m - fit.model.tissue.surface_m).abs();
     let layers = assumed.tissue.layers.iter().zip(&fit.model.tissue.layers).enumerate();
@@ -101,8 +103,7 @@ fn is_out_of_tolerance(assumed: &Assumptions, fit: &Fit) -> bool {
         })
 }
 
-/// The assumed tissue with the numbers that were found, under weak priors. Layers that the needle did not reach keep the assumed
-/// numbers.
+/// The assumed tissue with the parameters found in the data, under weak priors; layers that the needle did not reach are unchanged.
 fn assumptions_from(found: &FoundTissue, assumed: &Assumptions) -> Assumptions {
     let mut out = assumed.with_weak_priors();
     out.tissue.surface_m = found.surface_m;
@@ -111,7 +112,7 @@ fn assumptions_from(found: &FoundTissue, assumed: &Assumptions) -> Assumptions {
         let replace = |x: &mut f64, value: f64| *x = value.max(MIN_SHARE_OF_ASSUMED * *x);
         replace(&mut layer.stiffness_n_per_m, l.stiffness_n_per_m);
         replace(&mut layer.friction_ns_per_m2, l.friction_ns_per_m2);
-        // A layer that did not rupture ends where nobody looked.
+        // The thickness found for a layer that did not rupture is only a lower bound.
         layer.thickness_m =
             if l.rupture_n.is_some() { l.thickness_m } else { layer.thickness_m.max(l.thickness_m) };
         if let Some((assumed_n, found_n)) = layer.puncture_n.as_mut().zip(l.rupture_n) {

@@ -1,11 +1,11 @@
-//! Comparison of nested models under the noise of the larger one.
+//! Compares models by their likelihood under the noise of the larger one, and the BIC.
 
 use stylet_identify::evidence_nats::{Nats, UnderLargerModelNoise};
 use stylet_identify::fit::{Effort, Fit, fit_from_zero_scatter};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::noise::NoiseSource;
 
-/// Minimum gain of an effect, in nats, beyond half the logarithm of the number of blocks per fitted parameter.
+/// Smallest gain (nats) of an effect above its BIC penalty; it accounts for the choice among all candidates.
 pub const MIN_GAIN_NATS: f64 = 4.0;
 
 /// Gain in nats of `larger` over `smaller`, both fitted under the noise estimated from the residual of `larger`.

@@ -1,4 +1,4 @@
-//! Whether two diagnoses found the same model: another session, another day, another needle.
+//! Tests whether two diagnoses (of another session, day or needle) found the same model.
 
 use crate::diagnosis_json::{Diagnosis, LabelledParameter, ParameterLabel};
 use serde::{Deserialize, Serialize};
@@ -6,39 +6,39 @@ use stylet_stats::linear_algebra::{SymmetricMatrix, dot};
 use stylet_stats::normal;
 use stylet_stats::special_functions::chi_square_sf;
 
-/// Two models differ below this p-value, of all their common parameters together or of the most different one (Bonferroni): together one in
-/// twenty pairs of one model.
+/// Significance level of each of two tests, of all common parameters jointly and of the most different one (Bonferroni). Together they
+/// reject at most one in twenty pairs of equal models.
 pub const DIFFERENCE_P_VALUE: f64 = 0.025;
 
 /// One parameter in two models.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ParameterDifference {
-    /// Its name.
+    /// Name of the parameter.
     pub parameter: String,
     /// Value in both models.
     pub values: [f64; 2],
     /// Standard deviation of the difference.
     pub sd: f64,
-    /// p-value of a difference of this size when there is none (normal).
+    /// Two-sided p-value of the difference under equal values (normal).
     pub p_value: f64,
-    /// Whether it differs, with all parameters taken into account (Bonferroni).
+    /// Whether the difference is significant after correction for the number of parameters (Bonferroni).
     pub differs: bool,
 }
 
 /// Comparison of two models.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Consistency {
-    /// Parameters that both models have and that their recordings determine, in the order of the first.
+    /// Parameters that both models have and both sets of recordings determine, in the order of the first.
     pub parameters: Vec<ParameterDifference>,
-    /// Causes that only the first, and only the second model has.
+    /// Causes of only the first and of only the second model.
     pub causes: [Vec<String>; 2],
-    /// p-value of all differences together when there are none (chi-square, with both covariances).
+    /// Joint p-value of all differences under equal models (chi-square, with both covariances).
     pub p_value: f64,
-    /// Whether both are one model: the same causes, and no difference beyond chance.
+    /// Whether both are the same model: equal causes and no significant difference.
     pub is_consistent: bool,
 }
 
-/// Compares two diagnoses by their parameters and covariances. Both need `parameters` and `covariance`, which diagnoses of repeats lack.
+/// Compares two diagnoses by their parameters and covariances. Diagnoses of repeats lack both.
 #[must_use]
 pub fn compare_models(a: &Diagnosis, b: &Diagnosis) -> Consistency {
     let common: Vec<(usize, usize)> = a

@@ -1,23 +1,23 @@
-//! Grade of the extended model: one letter, as good as its worst part.
+//! Grade of the extended model: one letter, that of its worst part.
 //!
 //! | part | A | B | C | D |
 //! |---|---|---|---|---|
-//! | error of predictions over the noise (scatter between recordings known) or the repeatability | at most 1.25 | 2 | 4 | more |
+//! | prediction error given the scatter between recordings, over noise or repeatability | at most 1.25 | 2 | 4 | more |
 //! | residual | noise | | depends on a feature | unknown effect |
-//! | parameters that the recordings determine | at least 2/3 | 1/2 | 1/4 | fewer |
-//! | causes | separated | equivalent ones | one at a bound | |
+//! | share of determined parameters | at least 2/3 | 1/2 | 1/4 | fewer |
+//! | causes | unique | equivalent ones | one at a bound | |
 //! | recordings | different motions, each predicted from the others | one motion | one recording | |
 
 use crate::claims::SIGNIFICANT_P_VALUE;
 use crate::diagnosis_json::{Diagnosis, FindingKind, Grade, GradePart, Letter, ParameterLabel, Verdict};
 use stylet_stats::number_format::significant;
 
-/// Errors over the noise up to which a model has grade A, B and C.
+/// Largest ratio of the prediction error to the noise for grades A, B and C.
 const MAX_ERROR: [f64; 3] = [1.25, 2.0, 4.0];
-/// Shares of determined parameters from which a model has grade A, B and C.
+/// Smallest share of determined parameters for grades A, B and C.
 const MIN_DETERMINED: [f64; 3] = [2.0 / 3.0, 0.5, 0.25];
 
-/// The grade of a finished diagnosis; an error up to `resolution_n` is no misfit.
+/// Grade of a finished diagnosis; errors up to `resolution_n` (N) are not a misfit.
 #[must_use]
 pub fn grade(d: &Diagnosis, resolution_n: f64) -> Grade {
     let mut parts = Vec::new();
@@ -28,7 +28,7 @@ pub fn grade(d: &Diagnosis, resolution_n: f64) -> Grade {
     let noise_n = g.floor_n.max(resolution_n).max(f64::MIN_POSITIVE);
     let ratio = g.misfit_n() / noise_n;
     let what = if g.held_out { "held-out recordings are predicted" } else { "the recording is fitted" };
-    // The floor of repeats is how well they predict one another.
+    // For repeats the floor is their repeatability.
     let floor = if g.floor_n > d.noise.sd_n { "repeatability" } else { "noise" };
     let scatter = if g.is_worse() {
         ", worse than by the base law"

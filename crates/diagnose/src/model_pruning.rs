@@ -1,4 +1,4 @@
-//! Simplification and extension of a selected model: superfluous effects, special cases and extended forms.
+//! Simplifies and extends a selected model: removes superfluous effects, prefers special cases, and tries extended forms.
 
 use crate::base_law_fit::with_updated_times;
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
@@ -10,12 +10,12 @@ use stylet_identify::model::{EffectTerm, ParameterRole};
 use stylet_stats::parallel::*;
 use stylet_tissue::{FitScale, Proposal};
 
-/// A strength is determined when it differs from neutral by this many standard deviations.
+/// Standard deviations by which a determined strength differs from its inactive value.
 const MIN_STRENGTH_SD: f64 = 5.0;
 
 impl Search {
-    /// Replaces effects by their extended form (a second relaxation time constant) where its additional parameters pay.
-    /// The form names no further cause and needs no extra gain.
+    /// Replaces effects by their extended form (such as a second relaxation time constant) if its gain exceeds the BIC penalty. The
+    /// extended form is the same cause, so no further gain is required.
     pub(crate) fn use_extended_forms(&mut self, times: &[Vec<f64>]) {
         for k in 0..self.best.model.effects.len() {
             let Some(larger) = self.best.model.effects[k].info.extended else { continue };
@@ -45,7 +45,7 @@ impl Search {
         }
     }
 
-    /// Removes effects whose loss is smaller than their penalty.
+    /// Removes effects whose gain is below their penalty.
     pub(crate) fn prune(&mut self) {
         self.drop_confounded_clocks();
         loop {
@@ -74,8 +74,8 @@ impl Search {
     }
 }
 
-/// Moves a special case of the leader in front of it, unless the leader's additional parameters pay under its own noise
-/// and none of them stands at a bound.
+/// Moves a special case of the leading candidate before it, unless the gain of the additional parameters exceeds their penalty under the
+/// noise of the larger model and none is at a bound.
 pub(crate) fn special_case_first(mut full: Vec<Fit>, data: &FitData) -> Vec<Fit> {
     let Some(leader) = full.first() else { return full };
     let id = leader.model.effects.last().map_or("", |e| e.info.id);
@@ -91,15 +91,14 @@ pub(crate) fn special_case_first(mut full: Vec<Fit>, data: &FitData) -> Vec<Fit>
     full
 }
 
-/// Gain in nats that the additional parameters of `larger` require.
+/// Gain (nats) required of the additional parameters of `larger`.
 #[must_use]
 pub fn required_gain_nats(smaller: &Fit, larger: &Fit, data: &FitData) -> f64 {
     let more = larger.model.effect_parameter_count().saturating_sub(smaller.model.effect_parameter_count());
     bic_penalty(more, data.compared_block_count()) + MIN_GAIN_NATS
 }
 
-/// Whether each strength of an effect is determined by itself: two terms that replace one could share its strength
-/// arbitrarily.
+/// Whether each strength of an effect is significant by itself; two terms that replace one could share its strength arbitrarily.
 pub(crate) fn strengths_are_determined(f: &Fit, which: usize, data: &FitData) -> bool {
     let tangent = Linearization::new(&f.model, data, &f.residuals);
     let variances = tangent.factor().inverse_diagonal();
@@ -113,7 +112,7 @@ pub(crate) fn strengths_are_determined(f: &Fit, which: usize, data: &FitData) ->
     })
 }
 
-/// Whether a parameter of an effect stands at a bound.
+/// Whether a parameter of an effect is at a bound.
 #[must_use]
 pub fn effect_at_bound(f: &Fit, which: usize) -> bool {
     f.model.shared_parameters().iter().any(|n| match n.role {

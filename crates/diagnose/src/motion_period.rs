@@ -1,5 +1,4 @@
-//! Period of the commanded motion: at its harmonics a cause with a clock of its own cannot be distinguished from any force that
-//! depends on the motion.
+//! Period of the commanded motion: at its harmonics, a periodic cause is not distinguishable from a force that depends on the motion.
 
 use crate::selection_state::Search;
 use stylet_identify::block_averages::BlockAverages;
@@ -7,22 +6,22 @@ use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::likelihood::FitData;
 use stylet_stats::order_statistics::quantile;
 
-/// Outer quantiles of the velocity: the speeds of the two strokes.
+/// Lower and upper quantile of the velocity that give the speeds of the two strokes.
 const STROKE_QUANTILE: f64 = 0.05;
-/// A crossing of the mean of both speeds counts beyond this share of their difference.
+/// Hysteresis of the crossings of the mean speed, as a share of the difference of both speeds.
 const CROSSING_SHARE: f64 = 0.1;
-/// Speeds that differ by less, in m/s, are one speed.
+/// Smallest difference (m/s) of the speeds of a periodic motion.
 const MIN_SPEED_RANGE_MPS: f64 = 2e-5;
 /// Largest ratio of the longest to the shortest period of a periodic motion.
 const MAX_PERIOD_RATIO: f64 = 1.15;
-/// Share of the recording that the periods must cover; the rest shows what has a clock of its own.
+/// Share of the recording that the periods must cover; during the rest, a periodic cause would be visible.
 const MIN_COVERAGE: f64 = 0.8;
-/// Highest harmonic that a force which depends on the motion is expected to have.
+/// Highest harmonic expected in a force that depends on the motion.
 const MAX_HARMONIC: f64 = 20.0;
-/// Lowest subharmonic: one over this.
+/// Order of the lowest subharmonic considered: one quarter of the frequency.
 const MAX_SUBHARMONIC: u32 = 4;
 
-/// Period in s of a motion that is periodic throughout the recording; `None` for any other.
+/// Period (s) of a motion that is periodic over the recording; `None` otherwise.
 #[must_use]
 pub(crate) fn motion_period_s(b: &BlockAverages) -> Option<f64> {
     let times: Vec<f64> = (0..b.len()).map(|k| 0.5 * (b.start_s[k] + b.end_s[k])).collect();
@@ -66,7 +65,7 @@ fn length_s(b: &BlockAverages) -> f64 {
     last - first
 }
 
-/// Whether a frequency lies, within the resolution of the recording, at a harmonic or a low subharmonic of its motion.
+/// Whether a frequency is, within the resolution of the recording, a harmonic or low subharmonic of its motion.
 fn is_multiple_of_motion(hz: f64, b: &BlockAverages) -> bool {
     motion_period_s(b).is_some_and(|period_s| {
         let (order, resolution) = (hz * period_s, period_s / length_s(b));
@@ -76,7 +75,7 @@ fn is_multiple_of_motion(hz: f64, b: &BlockAverages) -> bool {
     })
 }
 
-/// The first effect of a fit with a clock of its own that no recording separates from the commanded motion.
+/// Index of the first periodic effect that no recording distinguishes from the commanded motion.
 fn confounded_clock(f: &Fit, data: &FitData) -> Option<usize> {
     let confounded = |hz: &f64| data.recordings.iter().all(|b| is_multiple_of_motion(*hz, b));
     f.model
@@ -92,7 +91,7 @@ pub(crate) fn has_confounded_clock(f: &Fit, data: &FitData) -> bool {
 }
 
 impl Search {
-    /// Removes effects whose clock drifted to a multiple of the commanded motion.
+    /// Removes periodic effects whose frequency converged to a multiple of the commanded motion.
     pub(crate) fn drop_confounded_clocks(&mut self) {
         while let Some(k) = confounded_clock(&self.best, &self.data) {
             let Some(f) = fit(&self.best.model.without_effect(k), &self.data, Effort::FULL) else { return };
@@ -101,7 +100,7 @@ impl Search {
     }
 }
 
-/// Shortest period (s) of the commanded motion, when it is periodic in every recording.
+/// Shortest period (s) of the commanded motions; `None` unless all are periodic.
 #[must_use]
 pub(crate) fn common_motion_period_s(data: &FitData) -> Option<f64> {
     let periods: Option<Vec<f64>> = data.recordings.iter().map(motion_period_s).collect();

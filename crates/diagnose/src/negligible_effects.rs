@@ -1,4 +1,4 @@
-//! Negligible effects: found by the search, but too small to matter or to improve held-out predictions.
+//! Negligible effects: selected by the search, but too small to matter or without improvement on held-out recordings.
 
 use crate::diagnosis_json::Cause;
 use crate::held_out::{
@@ -18,18 +18,18 @@ pub struct Negligible {
     pub reason: String,
 }
 
-/// A cause changes the held-out RMS by at least this share of the noise.
+/// Smallest change of the held-out RMS by a cause, as a share of the noise.
 const MIN_RMS_CHANGE: f64 = 0.002;
-/// A tissue motion below this share of the encoder noise is negligible.
+/// Share of the encoder noise below which the amplitude of a tissue motion is negligible.
 const MIN_MOTION_NOISE_SHARE: f64 = 0.1;
-/// A cause that explains less than this many nats per block must improve the held-out RMS.
+/// Gain (nats per block) below which a cause must improve the held-out RMS.
 const STRONG_NATS_PER_BLOCK: f64 = 0.3;
 
-/// Assumed relative error of an effect's equation: a smaller gain next to a dominant cause may be its model error.
-/// Recorded motions have noise, and a simulation integrates with finite steps.
+/// Assumed relative model error of a dominant cause, from noise of recorded motions and finite integration steps; a gain below its square
+/// may be this error.
 const MODEL_ERROR: f64 = 0.07;
 
-/// Causes that are negligible; `nats_against_zero` lists the nats against zero strength ([`Covariance::nats_against_zero`]).
+/// Negligible causes with their reasons; `nats_against_zero` are the values of [`Covariance::nats_against_zero`] by effect.
 ///
 /// [`Covariance::nats_against_zero`]: crate::confidence_intervals::Covariance::nats_against_zero
 #[must_use]
@@ -90,7 +90,7 @@ pub fn negligible_effects(
     causes.par_iter().filter_map(assess).collect()
 }
 
-/// Whether the strengths are less certain than the search required, under slow noise and with uncertain geometry.
+/// Whether the strengths are less significant than the search required, under long-memory noise and free geometry.
 fn is_uncertain(cause: &Cause, nats_against_zero: &[(String, f64)], search: &Search) -> bool {
     let stage = search.stages.iter().find(|s| s.selected.is_some_and(|t| t.0 == cause.effect));
     let against = nats_against_zero.iter().find(|a| a.0 == cause.effect);
@@ -103,7 +103,7 @@ fn acts_in_every_sample(info: &EffectInfo) -> bool {
         && !matches!(info.proposal, Proposal::MembraneRupture | Proposal::RawSamples)
 }
 
-/// Why a parameter is below the resolution of the instrument.
+/// Reason why a parameter is below the resolution of the instrument, if it is.
 fn unresolved(search: &Search, k: usize) -> Option<String> {
     let choice = &search.best.model.effects[k];
     for (p, value) in choice.info.parameters.iter().zip(&choice.values) {

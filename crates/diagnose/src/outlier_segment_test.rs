@@ -1,7 +1,7 @@
-//! Outlier segment test: a few seconds of one recording with a residual far above the rest.
+//! Outlier segment test: detects a few seconds of one recording with a residual far above the rest.
 //!
-//! A motion that only one recording contains (a hold, a retraction) may reveal a missing effect: its residual is not
-//! common to several recordings and its mean square is small, but slow noise would be as large everywhere.
+//! A motion that only one recording contains (a hold, a retraction) may reveal a missing effect. Its residual is not common to several
+//! recordings and its mean square is small, but slow noise would be as large everywhere.
 
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::likelihood::FitData;
@@ -9,16 +9,15 @@ use stylet_stats::order_statistics::median;
 
 /// Length in s of the windows whose means are compared.
 const WINDOW_S: f64 = 1.0;
-/// Consecutive windows of a segment: the residual of a misplaced rupture is shorter.
+/// Number of consecutive windows of a segment; the residual of a misplaced rupture is shorter.
 const SEGMENT_WINDOWS: usize = 2;
-/// The window means exceed the typical one by this factor: coloured normal noise practically never does.
+/// Ratio of the window means of a segment to the typical one; coloured normal noise practically never reaches it.
 const MIN_TYPICAL_RATIO: f64 = 10.0;
-/// The window means of a segment exceed this many standard deviations of the noise of a block.
+/// Ratio of the window means of a segment to the noise of a block.
 const MIN_NOISE_RATIO: f64 = 3.0;
 
-/// p-value of the most extreme segment in residuals `e` (N), if there is one: consecutive windows of one sign whose
-/// means are ten times the typical one and three times the noise of a block. The p-value is that of one normal mean as
-/// large, times the number of windows.
+/// p-value of the most extreme segment in residuals `e` (N), `None` without one. A segment has consecutive window means of one sign above
+/// both ratios. The p-value is that of a normal mean of this size, times the number of windows.
 #[must_use]
 pub fn outlier_segment_p_value(data: &FitData, e: &[Vec<f64>]) -> Option<f64> {
     let of = |(b, e): (&BlockAverages, &Vec<f64>)| -> Vec<f64> {
@@ -29,7 +28,7 @@ pub fn outlier_segment_p_value(data: &FitData, e: &[Vec<f64>]) -> Option<f64> {
                 sum += e[k] / data.noise.bin_at(b.abs_force_n[k]).sd_n;
                 n += 1;
             }
-            // Windows with gaps do not count.
+            // Windows with less than half of their blocks do not count.
             if 2 * n >= per { sum / n as f64 } else { f64::NAN }
         };
         (0..b.len()).step_by(per).map(mean).collect()

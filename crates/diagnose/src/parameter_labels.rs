@@ -1,8 +1,8 @@
-//! What recordings say about each parameter, and how the estimates covary.
+//! Labels the identifiability of each parameter, and computes the covariance of the estimates.
 //!
-//! A parameter is moved to both ends of its interval while the others follow (first order of the profile of the likelihood, Venzon and
-//! Moolgavkar 1988, with the objective itself at the ends). What the data lose there, without the parameter's own prior, is compared
-//! with what an interval's end costs: the data determine it on two sides, on one, or not at all.
+//! A parameter is moved to both ends of its interval while the others follow to first order (profile likelihood, Venzon and Moolgavkar
+//! 1988), and the objective is evaluated there. If the data alone, without the prior of this parameter, lose enough of the decrease at an
+//! interval end, they bound the parameter on that side.
 
 use crate::confidence_intervals::{Covariance, interval_end_nats};
 use crate::diagnosis_json::{BaseParameter, Cause, LabelledParameter, ParameterLabel};
@@ -11,26 +11,26 @@ use stylet_identify::likelihood::{FitData, residuals};
 use stylet_identify::model::{Model, Parameter, ParameterRole};
 use stylet_stats::Z95;
 
-/// The data close an interval where they lose at least this share of an interval end's loss: the prior provides the rest.
+/// Share of the decrease at an interval end that the data must lose to bound the parameter; the prior provides the rest.
 const MIN_DATA_SHARE: f64 = 0.5;
-/// Half width of a 95 % interval, relative to the value, up to which a parameter is determined.
+/// Largest half width of a 95 % interval, relative to the value, of a determined parameter.
 const MAX_RELATIVE_HALF_WIDTH: f64 = 0.1;
-/// Correlation from which two estimates trade.
+/// Correlation from which the estimates of two parameters trade with each other.
 const MIN_CORRELATION: f64 = 0.9;
 
-/// A parameter with its place in the fit.
+/// A parameter with its role in the fit.
 struct Entry {
     labelled: LabelledParameter,
     role: ParameterRole,
-    /// Derivative of the parameter by the fitted parameters.
+    /// Derivative with respect to the fitted parameters.
     gradient: Vec<f64>,
-    /// Standard deviation, as its interval has it.
+    /// Standard deviation, from the width of its interval.
     sd: f64,
-    /// Size with which the interval's half width is compared.
+    /// Reference of the relative half width.
     size: f64,
 }
 
-/// Labels of the parameters of the base law and of the causes, and their covariance in the same order.
+/// Labels of the parameters of the base law and of the causes, and their covariance in the same order and in their units.
 pub(crate) fn label_parameters(
     covariance: &Covariance,
     data: &FitData,
@@ -73,7 +73,7 @@ pub(crate) fn label_parameters(
     (labelled.collect(), matrix)
 }
 
-/// Role of a parameter of the base law in the fit, and the factor from the scale of the fit to its unit.
+/// Role of a base-law parameter in the fit, and the factor from the scale of the fit to its unit.
 pub(crate) fn base_role(model: &Model, layer: usize, name: &str) -> Option<(ParameterRole, f64)> {
     let layer = layer.wrapping_sub(1);
     let assumed = model.assumed.tissue.layers.get(layer);
@@ -133,7 +133,7 @@ fn effect_entries(covariance: &Covariance, causes: &[Cause]) -> Vec<Entry> {
     out
 }
 
-/// Whether the data close the interval of a parameter on two sides, on one, or on none.
+/// Label of a parameter by the sides on which the data bound it: both, one or none.
 fn profile_label(covariance: &Covariance, data: &FitData, role: ParameterRole) -> ParameterLabel {
     let Some(i) = covariance.index_of(role) else { return ParameterLabel::Determined };
     let Some((_, half)) = covariance.shared_parameter(role) else { return ParameterLabel::Determined };

@@ -1,8 +1,8 @@
-//! Parameters fitted to each recording alone, and whether the recordings have one value: Cochran's Q (Cochran 1954, "The combination of
-//! estimates from different experiments").
+//! Fits the parameters to each recording alone, and tests whether the recordings share one value with Cochran's Q (Cochran 1954, "The
+//! combination of estimates from different experiments").
 //!
-//! Ruptures and the scatter between recordings are those of the fit to all of them, so that scatter that is already in the model counts
-//! as uncertainty and not as a difference.
+//! Ruptures and scatter are those of the joint fit, so that modelled scatter between recordings counts as uncertainty and not as a
+//! difference.
 
 use crate::confidence_intervals::Covariance;
 use crate::diagnosis_json::{Estimate, LabelledParameter, ParameterByRecording, ParameterLabel};
@@ -18,10 +18,10 @@ use stylet_stats::special_functions::chi_square_sf;
 
 /// Effort of the fit to one recording, which starts at the fit to all.
 const EFFORT: Effort = Effort { max_iterations: 3, min_gain_nats: 0.1 };
-/// A recording bounds a parameter where its variance is at most this share of the prior's: the data know as much as the prior.
+/// Largest variance of an estimate, as a share of the prior variance: the data then give at least as much information as the prior.
 const MAX_PRIOR_SHARE: f64 = 0.5;
 
-/// The parameters that all recordings together determine, fitted to each recording alone; none for a single recording.
+/// The parameters that the recordings determine jointly, fitted to each recording alone; empty for a single recording.
 pub(crate) fn parameters_by_recording(
     best: &Fit,
     data: &FitData,
@@ -31,7 +31,7 @@ pub(crate) fn parameters_by_recording(
     if count < 2 {
         return Vec::new();
     }
-    // As for the intervals: noise of the whole residual, geometry free.
+    // Noise and geometry as for the intervals.
     let data = data.with_estimated_noise(&best.residuals.residual_n, NoiseSource::LongMemory);
     let joint = free_geometry(&best.model);
     let determined: Vec<&LabelledParameter> = labels
@@ -61,7 +61,7 @@ pub(crate) fn parameters_by_recording(
     determined.iter().enumerate().filter_map(compared).collect()
 }
 
-/// Value and standard deviation of a parameter; `None` where the recording knows less than the prior.
+/// Value and standard deviation of a parameter; `None` if the recording gives less information than the prior.
 fn estimate(covariance: &Covariance, p: &LabelledParameter) -> Option<(f64, f64)> {
     let model = &covariance.fit.model;
     let (role, gradient, value) = match &p.effect {
@@ -91,7 +91,7 @@ fn interval((value, sd): (f64, f64)) -> Estimate {
     Estimate { value, low: value - Z95 * sd, high: value + Z95 * sd }
 }
 
-/// p-value of differences as large as these when all have one value.
+/// p-value of the differences under one common value (Cochran's Q).
 fn cochran_p_value(values: &[(f64, f64)]) -> f64 {
     let weight: f64 = values.iter().map(|(_, sd)| sd.powi(-2)).sum();
     let mean = values.iter().map(|(x, sd)| x * sd.powi(-2)).sum::<f64>() / weight;

@@ -1,11 +1,10 @@
-//! The best model beside an unmodelled force: what the library explains of the misfit is taken out.
+//! The best model in the presence of an unmodelled force: the part of the misfit that library effects explain.
 
 use crate::diagnosis_json::PartialModel;
 use crate::held_out::{FreeRunResidual, pooled_rms};
 use crate::selection_state::Search;
 
-/// The best model of a search, when it predicts held-out recordings better than the base law; `noise_n` is the noise of a
-/// sample in N.
+/// The best model of a search, if it predicts held-out recordings better than the base law; `noise_n` is the noise of a sample in N.
 pub(crate) fn partial_model(
     search: &Search,
     base: &[Option<FreeRunResidual>],

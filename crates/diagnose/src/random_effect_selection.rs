@@ -1,7 +1,7 @@
-//! Selection of random effects: a surface position and a friction factor per recording.
+//! Selects random effects: a surface position and a friction factor per recording.
 //!
-//! Like the geometry they are no causes. They enter when they gain more than their parameters cost, and leave when an
-//! effect explains the differences.
+//! They are not causes. They are added if their gain exceeds their penalty, and removed if an effect explains the differences between
+//! recordings.
 
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use stylet_identify::fit::{Effort, Fit, fit, fit_if_below};
@@ -17,7 +17,7 @@ fn penalty_nats(free: FreeParameters, data: &FitData) -> f64 {
     bic_penalty(parameters, data.compared_block_count()) + MIN_GAIN_NATS * effect_count as f64
 }
 
-/// A model with other random effects.
+/// The model with other random effects.
 fn with_random_effects(model: &Model, own_surface: bool, own_friction: bool) -> Model {
     let mut m = model.clone();
     m.free = FreeParameters { recording_surface: own_surface, recording_friction: own_friction, ..m.free };
@@ -31,7 +31,7 @@ fn with_random_effects(model: &Model, own_surface: bool, own_friction: bool) -> 
     m
 }
 
-/// Random effects with the smallest penalised objective, with the noise re-estimated from the residual.
+/// Selects the random effects with the smallest penalised objective; the noise is then estimated again from the residual.
 #[must_use]
 pub fn select_random_effects(best: Fit, data: FitData) -> (Fit, FitData) {
     if data.recording_count() < 2 {
@@ -61,7 +61,7 @@ pub fn select_random_effects(best: Fit, data: FitData) -> (Fit, FitData) {
     if penalised_nats(&other) >= penalised_nats(&best) {
         return (best, data);
     }
-    // Under the noise of the larger model.
+    // The gain must also hold under the noise of the larger model.
     let effect_count =
         |f: &Fit| usize::from(f.model.free.recording_surface) + usize::from(f.model.free.recording_friction);
     let penalty = penalty_nats(other.model.free, &data) - penalty_nats(now, &data);

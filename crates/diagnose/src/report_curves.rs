@@ -1,4 +1,4 @@
-//! Curves and residual statistics for the report.
+//! Curves and residual statistics for the report of a diagnosis.
 
 use crate::diagnose::DiagnosisResult;
 use crate::diagnosis_json::Verdict;
@@ -18,13 +18,13 @@ pub struct RecordingCurves {
     pub velocity_mps: Vec<f64>,
     /// Measured force in N.
     pub force_n: Vec<f64>,
-    /// Residual of the fitted base law in N, with ruptures at the times found in the data.
+    /// Residual (N) of the fitted base law, with ruptures at fitted times.
     pub base_residual_n: Vec<f64>,
-    /// Residual of the extended model in N, with ruptures at the times found in the data.
+    /// Residual (N) of the extended model, with ruptures at fitted times.
     pub extended_residual_n: Vec<f64>,
-    /// Residual of the extended model in N, with ruptures where the model itself predicts them.
+    /// Residual (N) of the extended model, with ruptures at predicted times (free run).
     pub free_run_residual_n: Vec<f64>,
-    /// Whether the block was compared.
+    /// Whether the block is compared.
     pub used: Vec<bool>,
     /// Times in s at which layers ruptured.
     pub ruptures_s: Vec<f64>,
@@ -32,7 +32,7 @@ pub struct RecordingCurves {
     pub layer: Vec<usize>,
 }
 
-/// The fit that the report shows: the base law when the verdict is `unknown` without a cause, else the extended model.
+/// Fit shown in the report: the base law for the verdict `unknown` without a cause or partial model, else the extended model.
 #[must_use]
 pub fn reported_fit(examined: &DiagnosisResult) -> &Fit {
     let d = &examined.diagnosis;
@@ -73,8 +73,8 @@ pub fn recording_curves(examined: &DiagnosisResult) -> Vec<RecordingCurves> {
         .collect()
 }
 
-/// RMS of a residual by layer (rows; first: before the surface, last: behind the last layer) and phase (insertion,
-/// hold, retraction); NaN for fewer than 20 blocks.
+/// RMS of a residual (N) by layer (rows; first: before the surface, last: behind the last layer) and phase (insertion, hold, retraction);
+/// NaN for fewer than 20 blocks.
 #[must_use]
 pub fn rms_by_layer_and_phase(
     curves: &[RecordingCurves],
@@ -94,7 +94,7 @@ pub fn rms_by_layer_and_phase(
     sums.iter().map(|row| row.map(|(s, n)| if n < 20.0 { f64::NAN } else { (s / n).sqrt() })).collect()
 }
 
-/// Means of a residual in equal bins of `x`: bin centres and means, for bins with at least five values.
+/// Centres and means of a residual in equal bins of `x`, for bins with at least five values.
 #[must_use]
 pub fn binned_means(x: &[f64], e: &[f64], used: &[bool], bins: usize) -> (Vec<f64>, Vec<f64>) {
     let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));

@@ -1,11 +1,9 @@
-//! Residual tests: does the residual of a model depend on depth, time, speed, phase, travel since reversal or
-//! acceleration?
+//! Tests whether the residual of a model depends on depth, time, speed, phase, travel since reversal or acceleration.
 //!
-//! Residuals are averaged in bins of a feature; what several recordings have in common is no noise. The cross-recording
-//! statistic `T = sum_bins sum_(r<s) z_rb z_sb` has mean zero for any autocorrelation of the noise, because recordings
-//! are independent. Its variance depends on the autocorrelation, because slow noise correlates neighbouring bins:
-//! `sum_(r<s) sum_(b,b') C_r(b,b') C_s(b,b')`, with `C_r` from the autocovariance of a recording's residual after
-//! subtracting the means of the others (Bartlett 1935 for two series).
+//! Residuals are averaged in bins of a feature; structure common to several recordings is not noise. The cross-recording statistic
+//! `T = sum_bins sum_(r<s) z_rb z_sb` has mean zero for any autocorrelation of the noise, because recordings are independent.
+//! Its variance is `sum_(r<s) sum_(b,b') C_r(b,b') C_s(b,b')`, because slow noise correlates neighbouring bins; `C_r` follows from the
+//! autocovariance of a recording's residual after subtraction of the means of the others (Bartlett 1935 for two series).
 
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::Fit;
@@ -15,20 +13,20 @@ use stylet_stats::parallel::*;
 /// Structure in the residual of a model.
 #[derive(Clone, Debug, Default)]
 pub struct ResidualStructure {
-    /// Smallest p-value of the features, times their number.
+    /// Smallest p-value of the features, corrected for their number.
     pub p_value: f64,
     /// Features on which the residual depends, most significant first, with their p-values.
     pub depends_on: Vec<(String, f64)>,
-    /// Nats explained by the strongest of them.
+    /// Gain (nats) of the strongest of them.
     pub nats: f64,
 }
 
 /// Residual tests against two noise models.
 #[derive(Clone, Debug, Default)]
 pub struct ResidualTests {
-    /// Against noise with the autocorrelation of the residual: structure common to the recordings.
+    /// Against noise with the autocorrelation of the residual: detects structure common to the recordings.
     pub coloured_noise: ResidualStructure,
-    /// Against the noise of the data: slow noise of single recordings counts as structure too.
+    /// Against the noise of the data: detects slow noise of single recordings, too.
     pub white_noise: ResidualStructure,
 }
 
@@ -42,14 +40,14 @@ const FEATURES: [&str; 7] = [
     "depth_and_velocity",
     "acceleration_and_velocity",
 ];
-/// Upper limit of bins.
+/// Largest number of bins of a feature; blocks in higher bins are ignored.
 const MAX_BINS: usize = 800;
-/// Blocks of a recording that a bin needs.
+/// Smallest number of blocks of a recording in a bin.
 const MIN_BLOCKS: f64 = 3.0;
-/// Features with a smaller p-value are reported.
+/// p-value below which the dependence on a feature is reported.
 const MAX_REPORTED_P_VALUE: f64 = 1e-3;
 
-/// Upper tail of the normal distribution.
+/// Upper tail probability of the standard normal distribution.
 fn tail(z: f64) -> f64 {
     stylet_stats::normal::sf(z)
 }
@@ -106,7 +104,7 @@ pub fn test_residuals(fit: &Fit, data: &FitData) -> ResidualTests {
     }
 }
 
-/// Corrects the p-values for the number of features and keeps the significant ones.
+/// Corrects the p-values for the number of features and keeps the significant features.
 fn summarise(all: &[Structure], p: impl Fn(&Structure) -> f64) -> ResidualStructure {
     let mut found: Vec<(String, f64, f64)> = FEATURES
         .iter()
@@ -120,17 +118,17 @@ fn summarise(all: &[Structure], p: impl Fn(&Structure) -> f64) -> ResidualStruct
     ResidualStructure { p_value, depends_on: found.into_iter().map(|f| (f.0, f.1)).collect(), nats }
 }
 
-/// Bin sums of one recording, or of half a recording.
+/// Bin sums of one recording, or of half of a single recording.
 struct Part {
     /// Sum and count of every bin.
     sums: Vec<(f64, f64)>,
-    /// Bin of every block that is compared.
+    /// Bin of every compared block.
     bins: Vec<Option<usize>>,
-    /// Normalised residuals, outliers limited.
+    /// Normalised residuals, with outliers limited.
     w: Vec<f64>,
 }
 
-/// The recordings, or the alternating half seconds of a single one.
+/// One part per recording; of a single recording, one part for even and one for odd half seconds.
 fn parts(feature: usize, data: &FitData, w: &[Vec<f64>], deepest: f64) -> Vec<Part> {
     let mut parts = Vec::new();
     let halves = if data.recording_count() == 1 { 2 } else { 1 };
@@ -166,7 +164,7 @@ struct Statistic {
     nats: f64,
 }
 
-/// The statistic of these parts.
+/// Computes the statistic of these parts.
 fn statistic(parts: &[Part]) -> Statistic {
     let (mut t, mut variance, mut third, mut pooled, mut used) = (0.0, 0.0_f64, 0.0, 0.0, 0.0);
     for bin in 0..MAX_BINS {
@@ -176,13 +174,13 @@ fn statistic(parts: &[Part]) -> Statistic {
             pooled += all.0 * all.0 / all.1;
             used += 1.0;
         }
-        // Third cumulant of the sum over pairs of this many standard normal values.
+        // Third cumulant of the sum over pairs of standard normal values.
         let others = z.len().saturating_sub(1) as f64;
         third += others.powi(3) - others;
         for (k, a) in z.iter().enumerate() {
             for b in &z[..k] {
                 t += a.0 * b.0 / (a.1 * b.1).sqrt();
-                // Under the null hypothesis a product of independent values of unit variance.
+                // Under the null hypothesis each product has unit variance.
                 variance += 1.0;
             }
         }
@@ -229,8 +227,8 @@ fn lags() -> impl Iterator<Item = (usize, f64)> {
     (0..NEAR_LAGS).map(|k| (k, 1.0)).chain(far)
 }
 
-/// Variance of the statistic for noise with the autocorrelation of the recordings, and the factor by which correlated
-/// bins count as fewer.
+/// Variance of the statistic for noise with the autocorrelation of the recordings, and the factor by which correlation reduces the
+/// effective number of bins.
 fn coloured_moments(parts: &[Part]) -> (f64, f64) {
     let mut total = vec![(0.0, 0.0); MAX_BINS];
     for p in parts {
@@ -252,7 +250,7 @@ fn coloured_moments(parts: &[Part]) -> (f64, f64) {
     (variance, variance / diagonal.max(1e-300))
 }
 
-/// Covariance matrix (row by row) of a part's standardised bin sums; zero for bins with too few blocks.
+/// Covariance matrix (row by row) of the standardised bin sums of a part; zero for bins with too few blocks.
 fn covariance(part: &Part, total: &[(f64, f64)], kept: &[usize]) -> Vec<f64> {
     let residual: Vec<f64> = part
         .w
@@ -292,9 +290,8 @@ fn covariance(part: &Part, total: &[(f64, f64)], kept: &[usize]) -> Vec<f64> {
     c
 }
 
-/// Upper tail at `z` of a standardised variable with this skewness: the gamma distribution of equal skewness, by Wilson
-/// and Hilferty (1931), to a relative error of a quarter. A sum of few products has longer tails than a normal
-/// variable.
+/// Upper tail probability at `z` of a standardised variable with this skewness: gamma distribution of equal skewness, by Wilson and
+/// Hilferty (1931), with a relative error of a quarter. A sum of few products has longer tails than a normal variable.
 #[must_use]
 pub fn skewed_tail(z: f64, skewness: f64) -> f64 {
     if skewness < 1e-6 {

@@ -1,17 +1,16 @@
-//! Iteratively reweighted fit in the presence of an unmodelled force.
+//! Iteratively reweighted fit for data with an unmodelled force.
 //!
-//! With the sensor noise as weight, a large unmodelled force distorts the fit: true effects are biased and imitations
-//! are selected. But such a force is usually local, for example in depth. Each block is therefore weighted by the
-//! residual around it, counted by its correlation (iteratively reweighted least squares, Beaton and Tukey 1974, with a
-//! local scale), so that the low-residual regions determine the effects.
+//! Under the sensor noise, a large unmodelled force biases true effects and leads to the selection of imitations. Such a force is usually
+//! local, for example in depth. Each block is therefore weighted by the local residual, scaled for its correlation (iteratively reweighted
+//! least squares, Beaton and Tukey 1974), so that regions with small residuals determine the effects.
 
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::likelihood::FitData;
 
-/// Half width (s) of the window in which the residual is averaged.
+/// Half width (s) of the window in which the local residual is averaged.
 const HALF_WINDOW_S: f64 = 0.25;
-/// The residual counts as unexplained from this many standard deviations of the noise.
+/// Ratio of the local residual to the noise from which it counts as unexplained.
 const MIN_RESIDUAL_SD: f64 = 1.5;
 /// Iterations of weighting and fitting.
 const ITERATIONS: usize = 4;
@@ -35,8 +34,8 @@ fn reweighted_data(f: &Fit, data: &FitData) -> FitData {
     data.with_recordings(data.recordings.iter().zip(&f.residuals.residual_n).map(of).collect())
 }
 
-/// Standard deviation (N) of the residual around every block, scaled for its correlation; 0 where it does not exceed
-/// the noise.
+/// Standard deviation (N) of the residual around every block, scaled for its correlation; 0 if it does not exceed the noise by
+/// [`MIN_RESIDUAL_SD`].
 fn local_residual_sd(b: &BlockAverages, e: &[f64], data: &FitData) -> Vec<f64> {
     let half = (HALF_WINDOW_S / (b.sample_step_s * b.samples_per_block as f64)).round().max(1.0) as usize;
     let square = |k: usize| if b.used[k] { (e[k] * e[k], 1.0) } else { (0.0, 0.0) };

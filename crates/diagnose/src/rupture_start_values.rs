@@ -1,8 +1,7 @@
-//! Start values for effects that act on rupture forces alone, such as a rate-dependent puncture force.
+//! Start values of effects that act on rupture forces alone, such as a rate-dependent puncture force.
 //!
-//! Such an effect score_tests like random scatter of the rupture forces until it is fitted, and with a wide scatter the
-//! gradient of the likelihood is close to zero. Strengths are therefore tried on a grid, each with its own puncture
-//! forces and scatter.
+//! Without such an effect the rupture forces have a large scatter, under which the gradient of the likelihood is close to zero. Strengths
+//! are therefore tried on a grid, each with its own puncture forces and scatter.
 
 use crate::effect_start::EffectStart;
 use stylet_identify::likelihood::replay;
@@ -14,15 +13,14 @@ use stylet_identify::score_test::ScoreTest;
 use stylet_stats::parallel::*;
 use stylet_tissue::EffectInfo;
 
-/// Grid points per pass. The first pass covers the parameter's search range; later passes refine around the best point.
+/// Grid points per pass. The first pass covers the search range of the parameter; later ones refine the grid around the best point.
 const GRID_POINTS: usize = 21;
 /// Passes of the grid search.
 const GRID_PASSES: usize = 3;
-/// Upper limit of what one rupture may add to the objective, in nats: near a velocity jump the time of rupture is
-/// uncertain.
+/// Largest contribution (nats) of one rupture to the objective: near a velocity jump the rupture time is uncertain.
 const MAX_EVENT_NATS: f64 = 12.0;
 
-/// Best start value of a one-parameter effect by the ruptures alone; `None` when no strength improves their likelihood.
+/// Best start value of a one-parameter effect from the ruptures; `None` when no strength improves their likelihood.
 #[must_use]
 pub fn start_from_ruptures(info: &'static EffectInfo, score_test: &ScoreTest) -> Option<EffectStart> {
     let [parameter] = info.parameters else { return None };
@@ -59,8 +57,8 @@ pub fn start_from_ruptures(info: &'static EffectInfo, score_test: &ScoreTest) ->
     })
 }
 
-/// Objective (nats) of the ruptures at their present times, minimised over puncture forces and force scatter, and the
-/// model with these values.
+/// Minimum over puncture forces and force scatter of the objective (nats) of the ruptures at their present times, and the model with these
+/// values.
 fn rupture_objective(score_test: &ScoreTest, mut model: Model) -> Option<(f64, Model)> {
     let events: Vec<Vec<RuptureEvent>> = (0..score_test.data.recording_count())
         .map(|r| Some(replay(&model, score_test.data, r)?.ruptures))
@@ -85,7 +83,7 @@ fn rupture_objective(score_test: &ScoreTest, mut model: Model) -> Option<(f64, M
     Some((nats, model))
 }
 
-/// Rupture events of one layer, and the factors on its puncture force that single events ask for.
+/// Rupture events of one layer, and trial factors on its puncture force, each of which fits one event.
 struct LayerEvents {
     events: Vec<RuptureEvent>,
     factors: Vec<f64>,

@@ -1,5 +1,4 @@
-//! Restarts of the effect selection: refits of candidates from the prior, and of the current model from a candidate's
-//! parameters.
+//! Restarts of the effect selection: refits candidates from the prior, and the current model from a candidate's parameters.
 
 use crate::base_law_fit::{
     PreparedRecordings, coarse_refit, random_effects_of, refit_from_prior, with_noise_of,
@@ -14,18 +13,18 @@ use stylet_identify::model::EffectTerm;
 use stylet_stats::parallel::*;
 use stylet_tissue::Proposal;
 
-/// Candidates behind the best by more than this share of its gain get no full fit.
+/// Largest distance of a candidate from the best, as a share of the best gain, for a full fit.
 pub(crate) const MAX_BEHIND_SHARE: f64 = 0.5;
-/// A restart must gain this share of the leader's gain: a marginally better base model does not change the selection.
+/// Smallest gain of a restart as a share of the leading candidate's gain; a marginally better model does not change the selection.
 const MIN_RESTART_SHARE: f64 = 0.1;
-/// A coarse refit may be behind the leader by this share of the leader's gain to be refitted in full.
+/// Largest distance of a coarse refit from the leading candidate, as a share of that candidate's gain, for a full refit.
 const MAX_COARSE_BEHIND_SHARE: f64 = 0.05;
-/// Candidates that are refitted in full from the prior.
+/// Largest number of candidates that are fully refitted from the prior.
 const MAX_PRIOR_REFITS: usize = 3;
 
 impl Search {
-    /// Refits promising candidates from the prior until one leaves only noise, when even the leader leaves far more:
-    /// the fits so far may depend on ruptures that were assigned without the effect.
+    /// Refits promising candidates from the prior until one leaves only noise; `None` if the leading candidate already does, or no refits
+    /// are left. The fits so far may depend on ruptures that were assigned without the effect.
     pub(crate) fn refit_candidates_from_prior(
         &mut self,
         full: &[Fit],
@@ -43,7 +42,7 @@ impl Search {
             effects.push(choice.clone());
             effects
         };
-        // Coarse refits of all candidates and of the model without them; full refits of those close to the best.
+        // Coarse refits of all candidates and of the model without them, then full refits of those close to the best.
         let coarse = with_noise_of(&leader.model, coarse)?;
         let leader_nats = residuals(&leader.model, &coarse)?.nats;
         let random_effects = random_effects_of(&self.best.model);
@@ -69,7 +68,7 @@ impl Search {
         let mut names: Vec<&str> = Vec::new();
         coarse_fits.retain(|(_, effects)| effects.last().is_some_and(|e| is_new_name(&mut names, e.info.id)));
         let most = current - coarse_fits.first()?.0;
-        // A coarse refit further behind than this does not overtake the leader.
+        // Candidates further behind would not overtake the leading one.
         let reach = leader_nats + MAX_COARSE_BEHIND_SHARE * (current - leader_nats).max(0.0);
         coarse_fits.retain(|s| current - s.0 > MAX_BEHIND_SHARE * most && s.0 < reach);
         coarse_fits.truncate(MAX_PRIOR_REFITS);
@@ -85,8 +84,8 @@ impl Search {
         Some(started)
     }
 
-    /// Whether a good part of the leader's gain comes from better start values: the current model, refitted from the
-    /// leader's parameters, then replaces itself.
+    /// Refits the current model from the parameters of the leading candidate, and accepts it if it gains enough; returns whether it did. A
+    /// part of the candidate's gain is then due to better start values.
     pub(crate) fn restart_from_leader(&mut self, full: &[Fit]) -> bool {
         let Some(leader) = full.first() else { return false };
         let Some(last) = leader.model.effects.len().checked_sub(1) else { return false };
@@ -106,7 +105,7 @@ impl Search {
     }
 }
 
-/// Whether the last effect of a fit is new to `names`; adds it.
+/// Whether the last effect of a fit is not in `names` yet; adds it.
 pub(crate) fn is_new_effect(names: &mut Vec<&'static str>, f: &Fit) -> bool {
     is_new_name(names, f.model.effects.last().map_or("", |e| e.info.id))
 }

@@ -16,9 +16,9 @@ pub struct SearchStage {
     pub included: Vec<&'static str>,
     /// Candidates: identifier, gain in nats under the noise of the search, number of parameters.
     pub candidates: Vec<(&'static str, f64, usize)>,
-    /// The selected effect and its gain.
+    /// The selected effect and its gain in nats.
     pub selected: Option<(&'static str, f64)>,
-    /// Gain in nats that it needed.
+    /// Gain in nats required of it.
     pub required_nats: f64,
     /// The candidates with their fitted values.
     pub choices: Vec<EffectTerm>,
@@ -34,9 +34,9 @@ pub struct Search {
     pub data: FitData,
     /// Steps so far.
     pub stages: Vec<SearchStage>,
-    /// Restarts that are left.
+    /// Remaining restarts.
     pub(crate) restarts: usize,
-    /// Refits from the prior that are left.
+    /// Remaining refits from the prior.
     pub(crate) prior_refits: usize,
     /// Frequencies (Hz) of tones in the residual.
     pub(crate) tones_hz: Vec<f64>,
@@ -56,7 +56,7 @@ impl Search {
         }
     }
 
-    /// A search with another best fit and other weights, without restarts.
+    /// A search with another best fit and its data, without restarts.
     pub(crate) fn with_best(&self, best: Fit, data: FitData) -> Self {
         Self { base: self.base.clone(), stages: self.stages.clone(), ..Self::from_fit(best, data) }
     }
@@ -80,7 +80,7 @@ impl Search {
         self.tones_hz = found;
     }
 
-    /// The data on coarser blocks with the noise of the best fit, to rank candidates.
+    /// The data on coarser blocks with the noise of the best fit, for ranking candidates.
     pub(crate) fn coarse(&self) -> FitData {
         let coarse = self.data.with_recordings(
             self.data.recordings.par_iter().map(|b| b.coarsened(COARSENING_FACTOR)).collect(),
@@ -90,7 +90,7 @@ impl Search {
         with_noise_without_tones(&Fit { model, residuals }, &coarse, &self.tones_hz)
     }
 
-    /// Makes a fit the best one and re-estimates the noise from its residual.
+    /// Sets the best fit, and estimates the noise from its residual.
     pub fn accept(&mut self, f: Fit) {
         self.data = with_break_uncertainty(&f.model, &self.data)
             .with_estimated_noise(&f.residuals.residual_n, NoiseSource::Detrended);
@@ -104,7 +104,7 @@ impl Search {
         };
     }
 
-    /// Makes a fit the best one in which a competing effect replaces effect `k`, also in the stage that selected it.
+    /// Sets the best fit to one in which a competing effect replaces effect `k`, and updates the stage that selected it.
     pub fn replace_effect(&mut self, k: usize, f: Fit) {
         let (Some(old), Some(new)) = (self.best.model.effects.get(k), f.model.effects.get(k)) else { return };
         let (old, new, more) = (old.info.id, new.info.id, self.best.nats() - f.nats());

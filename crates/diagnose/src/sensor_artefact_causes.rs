@@ -1,11 +1,11 @@
-//! Sensor artefacts found in the raw samples, reported as causes.
+//! Reports sensor artefacts in the raw samples (saturation, quantisation, spikes) as causes.
 
 use crate::diagnosis_json::{Cause, Estimate};
 use stylet_record::sensor_artefacts::SensorArtefacts;
 use stylet_stats::Z95;
 use stylet_tissue::{AnyEffect, Effect, ForceSpikes, Quantisation, Saturation};
 
-/// Sensor artefacts as causes.
+/// Sensor artefacts as causes; `noise_n` is the noise of a sample in N.
 pub(crate) fn sensor_artefact_causes(raw: &SensorArtefacts, noise_n: f64) -> Vec<Cause> {
     let mut causes = Vec::new();
     let mut add = |effect: AnyEffect, intervals: &[(f64, f64)]| {
@@ -31,7 +31,7 @@ pub(crate) fn sensor_artefact_causes(raw: &SensorArtefacts, noise_n: f64) -> Vec
     };
     let about = |value: f64, sd: f64| (value - Z95 * sd, value + Z95 * sd);
     if let Some(limit_n) = raw.limit_n {
-        // A quantised force shows its limit at the nearest step.
+        // A quantised force saturates at the step next to the limit.
         let half_n = 0.5 * raw.step_n.unwrap_or(0.0) + 1e-6 * limit_n;
         add(Saturation { limit_n }.into(), &[(limit_n - half_n, limit_n + half_n)]);
     }

@@ -1,4 +1,4 @@
-//! Detection of tones in the residual spectrum, at the sampling rate of the recordings.
+//! Detects tones in the residual spectrum at the sampling rate, and removes them from the noise estimate.
 
 use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::FitData;
@@ -26,7 +26,7 @@ pub fn residual_spectrum(fit: &Fit, data: &FitData) -> (Vec<f64>, Vec<f64>) {
     power(fit, data, 1).for_plot()
 }
 
-/// Residuals (N) of a fit without the tones at these frequencies (Hz); amplitude and phase are fitted per recording.
+/// Block residuals (N) of a fit without tones at the frequencies `lines` (Hz), whose amplitude and phase are fitted per recording.
 #[must_use]
 pub fn remove_tones(fit: &Fit, data: &FitData, lines: &[f64]) -> Vec<Vec<f64>> {
     let mut e = fit.residuals.residual_n.clone();
@@ -38,8 +38,7 @@ pub fn remove_tones(fit: &Fit, data: &FitData, lines: &[f64]) -> Vec<Vec<f64>> {
     e
 }
 
-/// The data with the noise estimated from the residual without these tones (Hz): an autoregression would absorb them as
-/// coloured noise.
+/// The data with the noise estimated from the residual without these tones (Hz), which an autoregression would absorb as coloured noise.
 #[must_use]
 pub fn with_noise_without_tones(fit: &Fit, data: &FitData, lines: &[f64]) -> FitData {
     data.with_estimated_noise(&remove_tones(fit, data, lines), NoiseSource::Detrended)

@@ -1,9 +1,8 @@
-//! Varying-coefficient test: does an effect act by its own equation, or does it imitate an unmodelled one?
+//! Varying-coefficient test: distinguishes a true effect from one that imitates an unmodelled effect.
 //!
-//! In the presence of an unmodelled effect the search selects whatever reproduces a part of it, for example presliding
-//! friction for backlash of the clamp, or a bias for a force that follows the squared acceleration. The force of an
-//! effect that is really there needs no further dependence; the force of an imitation gains when it is allowed to vary
-//! with depth, speed, time or another feature (Hastie and Tibshirani 1993).
+//! In the presence of an unmodelled effect, the search selects any effect that reproduces a part of it, for example presliding friction for
+//! backlash of the clamp. The force of a true effect has no further dependence; that of an imitation gains if it may vary with depth,
+//! speed, time or another feature (Hastie and Tibshirani 1993).
 
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::JacobianColumn;
@@ -13,33 +12,32 @@ use stylet_identify::score_test::ScoreTest;
 use stylet_stats::order_statistics::quantile;
 use stylet_tissue::effect::sgn;
 
-/// Speeds below this (m/s) count as hold.
+/// Speed (m/s) below which the needle holds.
 const HOLD_SPEED_MPS: f64 = 2e-4;
 
 /// Features with which the force of an effect may vary.
 pub const FEATURES: [&str; 8] =
     ["depth", "speed", "time", "retraction", "hold", "force", "acceleration", "travel_since_reversal"];
-/// Travel in m after which the decay following a reversal has fallen to one half.
+/// Travel (m) after a reversal at which the corresponding feature has decayed to one half.
 const REVERSAL_TRAVEL_M: f64 = 1e-3;
-/// Quantile at which features are clipped on both sides: accelerations at velocity jumps grow with the sampling rate.
+/// Quantile at which features are clipped on both sides, because accelerations at velocity jumps grow with the sampling rate.
 const CLIP_QUANTILE: f64 = 0.01;
-/// A column of which less than this share is linearly independent of the fitted parameters is treated as rounding
-/// error.
+/// Share of a column that must be linearly independent of the fitted parameters; less is rounding error.
 const MIN_INDEPENDENT_SHARE: f64 = 1e-6;
 
-/// The feature with which the force of an effect would vary most.
+/// Feature with which the force of an effect varies most.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VaryingCoefficient {
     /// Name of the feature.
     pub feature: &'static str,
     /// Gain of the fit in nats.
     pub nats: f64,
-    /// Gain as a share of what the fit loses without the effect.
+    /// Gain as a share of the loss without the effect.
     pub share: f64,
 }
 
-/// First-order gain of a fit when the force of an effect may also vary with a feature, for the feature that gains most;
-/// all fitted parameters adapt. `loss_nats` is the loss (nats) without the effect. `None` when its force cannot be computed.
+/// First-order gain of a fit if the force of an effect may vary with a feature, for the feature with the largest gain; all fitted
+/// parameters adapt. `loss_nats` is the loss (nats) without the effect. `None` when its force cannot be computed.
 #[must_use]
 pub fn varying_coefficient_test(
     score_test: &ScoreTest<'_>,
@@ -68,8 +66,8 @@ fn columns(score_test: &ScoreTest<'_>, effect: usize) -> Option<Vec<JacobianColu
     Some(all.iter().map(|w| score_test.force_column(&interaction_column(&forces, w))).collect())
 }
 
-/// Features of every block of a recording; `predicted` is the predicted force (N). The measured force is not used: its
-/// noise would correlate with any residual.
+/// Features of every block of a recording; `predicted` is the predicted force (N), used instead of the measured one because noise would
+/// correlate with the residual.
 fn features(b: &BlockAverages, predicted: &[f64]) -> [Vec<f64>; FEATURES.len()] {
     let mut out: [Vec<f64>; FEATURES.len()] = Default::default();
     let (mut before, mut sign, mut since_m) = (None, 0.0, 0.0);
@@ -94,7 +92,7 @@ fn features(b: &BlockAverages, predicted: &[f64]) -> [Vec<f64>; FEATURES.len()] 
 /// Forces in N, by recording and block.
 type Forces = Vec<Vec<f64>>;
 
-/// Force of an effect, and total force.
+/// Force (N) of an effect, and total force.
 fn force(score_test: &ScoreTest<'_>, effect: usize) -> Option<(Forces, Forces)> {
     let (fit, data) = (score_test.fit, score_test.data);
     let of = |model: &Model| -> Option<Forces> {
@@ -105,7 +103,7 @@ fn force(score_test: &ScoreTest<'_>, effect: usize) -> Option<(Forces, Forces)> 
     Some((total.iter().zip(&reduced).map(part).collect(), total))
 }
 
-/// Forces times the standardised feature, which is clipped at its outer percentiles.
+/// Forces times the standardised feature, which is clipped at [`CLIP_QUANTILE`].
 fn interaction_column(forces: &[Vec<f64>], feature: &[Vec<f64>]) -> Forces {
     let mut all: Vec<f64> = feature.iter().flatten().copied().collect();
     let (low, high) = (quantile(&mut all, CLIP_QUANTILE), quantile(&mut all, 1.0 - CLIP_QUANTILE));

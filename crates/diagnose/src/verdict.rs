@@ -1,4 +1,5 @@
-//! Verdict of a diagnosis: is the residual noise, and are the selected effects causes or imitations of an unmodelled one?
+//! Assesses a finished selection: whether the residual is noise, and whether the selected effects are causes or imitations of an unmodelled
+//! one.
 
 use crate::competing_effects::{CompetingEffect, EQUIVALENCE_NATS};
 use crate::confidence_intervals::{Covariance, release_unreached_punctures};
@@ -25,47 +26,44 @@ use stylet_identify::score_test::ScoreTest;
 use stylet_stats::special_functions::chi_square_sf;
 use stylet_tissue::EffectInfo;
 
-/// Residual structure counts below this p-value: sums over pairs of recordings have longer tails than their skewness
-/// suggests.
+/// p-value below which the residual has structure. It is small because sums over pairs of recordings have longer tails than their skewness
+/// implies.
 const MAX_STRUCTURE_P_VALUE: f64 = 1e-6;
-/// The verdict is `unknown` when more than this share of the base law's residual variance beyond the noise is
-/// unexplained.
+/// Unexplained share of the base law's residual variance above the noise from which the verdict is `unknown`.
 const MAX_UNEXPLAINED_SHARE: f64 = 0.1;
-/// Excess variance from which the residual counts as unexplained, in units of the noise variance.
+/// Excess variance of the residual, in units of the noise variance, from which it counts as unexplained.
 const MIN_EXCESS: f64 = 0.8;
-/// The same for a single recording, where structure and slow noise cannot be separated.
+/// Excess variance from which the residual of a single recording counts as unexplained: its structure is not distinguishable from slow
+/// noise.
 const MIN_EXCESS_SINGLE: f64 = 3.0;
-/// Excess variance from which a residual is no noise, whatever its autocorrelation: a slow standard deviation of 2.5
-/// times the fast one.
+/// Excess variance from which a residual is not noise, whatever its autocorrelation: a slow standard deviation of 2.5 times the fast one.
 const MIN_EXCESS_SLOW: f64 = 6.0;
-/// An effect imitates an unmodelled one when its varying-coefficient test gains more than this share of the gain of all
-/// effects.
+/// Gain of the varying-coefficient test, as a share of the largest gain of an effect, from which an effect is an imitation.
 const MIN_IMITATION_SHARE: f64 = 0.02;
-/// Smallest gain in nats of the test for imitation: half a nat is chance, and an inexact motion gives some tens.
+/// Smallest gain (nats) of that test for an imitation: chance gives half a nat, and an inexact motion some tens.
 const MIN_IMITATION_NATS: f64 = 100.0;
-/// Smallest gain in nats of the test for imitation under slow noise.
+/// Smallest gain (nats) of the varying-coefficient test for an imitation under long-memory noise.
 const MIN_IMITATION_SLOW_NATS: f64 = 10.0;
-/// Largest relative jackknife error of a cause that is kept in the presence of an unmodelled effect.
+/// Largest relative jackknife error of a cause in the presence of an unmodelled effect.
 const MAX_RELATIVE_SE: f64 = 0.1;
-/// Share of the held-out error that a cause must remove in the presence of an unmodelled effect.
+/// Smallest share of the held-out error that such a cause removes.
 const MIN_HELD_OUT_GAIN: f64 = 0.1;
-/// Largest gain of the varying-coefficient test of such a cause in the reweighted fit, as a share of the loss without
-/// it.
+/// Largest gain of the varying-coefficient test of such a cause in the reweighted fit, as a share of the loss without it.
 const MAX_VARYING_SHARE: f64 = 0.001;
-/// Largest gain of the varying-coefficient test of such a cause in the fit with equal weights.
+/// Largest gain of that test in the fit with equal weights, as a share of the loss without the cause.
 const MAX_VARYING_SHARE_UNWEIGHTED: f64 = 0.03;
-/// Largest gain of the varying-coefficient test for effects that imitate any force of their kind.
+/// Largest gain of the varying-coefficient test, as a share of the loss, for effects that can imitate any force of their kind.
 const MAX_VARYING_SHARE_IMITATING: f64 = 0.0005;
-/// Seed of the bootstrap: equal recordings give equal results.
+/// Seed of the bootstrap, constant so that equal recordings give equal results.
 const BOOTSTRAP_SEED: u64 = 1;
 
-/// Results that follow from the selection alone.
+/// Assessment of a selection.
 pub(crate) struct Assessment {
     pub causes: Vec<Cause>,
-    /// Nats against zero strength of each effect.
+    /// Evidence (nats) against zero strength of each effect.
     pub nats_against_zero: Vec<(String, f64)>,
     pub base_parameters: Vec<BaseParameter>,
-    /// What the recordings say about each parameter, and the covariance of the estimates.
+    /// Identifiability of each parameter, and covariance of the estimates.
     pub labels: (Vec<LabelledParameter>, Vec<Vec<f64>>),
     pub residual_structure: ResidualStructureReport,
     pub unknown: bool,
@@ -73,9 +71,9 @@ pub(crate) struct Assessment {
     pub has_tones: bool,
 }
 
-/// Mean square of a residual beyond the noise, in units of the noise variance, with outliers limited.
+/// Excess variance of a residual in units of the noise variance, with outliers limited.
 fn excess(data: &FitData, e: &[Vec<f64>]) -> f64 {
-    /// Outliers are limited to this many standard deviations.
+    /// Residuals are limited to this many standard deviations.
     const OUTLIER_LIMIT_SD: f64 = 6.0;
     /// Blocks excluded on both sides of a velocity jump of uncertain time.
     const JUMP_MARGIN_BLOCKS: usize = 4;
@@ -98,14 +96,14 @@ fn excess(data: &FitData, e: &[Vec<f64>]) -> f64 {
     sum / f64::max(n, 1.0) - 1.0
 }
 
-/// p-value of a tone with `excess` times the power of all other frequencies together, in white noise (Fisher 1929).
+/// p-value of a tone whose power is `excess` times that of all other frequencies, in white noise (Fisher 1929).
 fn tone_p_value(excess: f64, blocks: usize) -> f64 {
     let bins = 0.5 * blocks as f64;
     (bins * libm::pow(1.0 + excess, 1.0 - bins)).clamp(f64::MIN_POSITIVE, 1.0)
 }
 
-/// Assesses the residual and the effects of a finished selection. When the residual has tones, the search continues with
-/// the noise estimated without them.
+/// Assesses the residual and the effects of a finished selection. If the residual has tones, the data of the search get the noise estimated
+/// without them.
 pub(crate) fn assess_search(search: &mut Search, competing: &[Vec<CompetingEffect>]) -> Assessment {
     let tests = test_residuals(&search.best, &search.data);
     let tones = detect_tones(&search.best, &search.data);
@@ -136,7 +134,7 @@ pub(crate) fn assess_search(search: &mut Search, competing: &[Vec<CompetingEffec
         )
     };
     let without: Vec<Option<Fit>> = (0..search.best.model.effects.len()).map(without).collect();
-    // Intervals under the noise of the whole residual, structure and slow parts included.
+    // Intervals use the noise of the whole residual, including structure and slow parts.
     let slow_data =
         search.data.with_estimated_noise(&search.best.residuals.residual_n, NoiseSource::LongMemory);
     let with_slow_noise =
@@ -204,7 +202,7 @@ pub(crate) fn assess_search(search: &mut Search, competing: &[Vec<CompetingEffec
         share,
     };
     if has_tones {
-        // All objectives use the same noise.
+        // All objectives then use the same noise.
         for fit in [&mut search.base, &mut search.best] {
             fit.residuals = residuals(&fit.model, &without_tones).unwrap_or_else(|| fit.residuals.clone());
         }
@@ -213,9 +211,8 @@ pub(crate) fn assess_search(search: &mut Search, competing: &[Vec<CompetingEffec
     Assessment { causes, nats_against_zero, base_parameters, labels, residual_structure, unknown, has_tones }
 }
 
-/// Varying-coefficient test of all effects: the effect with the largest gain, if it imitates an unmodelled one.
-/// `without` are the fits without each effect; `slow` is the fit under slow noise, because sensor drift mimics a
-/// dependence on time.
+/// Varying-coefficient test of all effects: result of the effect with the largest gain, if it is an imitation. `without` are the fits
+/// without each effect; `slow` is the fit under long-memory noise, because sensor drift resembles a dependence on time.
 fn find_imitation(
     best: &Fit,
     data: &FitData,
@@ -238,8 +235,8 @@ fn find_imitation(
     without.iter().enumerate().filter_map(test).max_by(|a, b| a.nats.total_cmp(&b.nats))
 }
 
-/// Whether an effect is kept as a cause in the presence of an unmodelled one, by the reweighted fit (`reweighted`) and, if
-/// it was found there, the fit with equal weights (`unweighted`).
+/// Whether an effect remains a cause in the presence of an unmodelled one, by the reweighted fit and, if it was selected there too, the fit
+/// with equal weights (`unweighted`).
 pub(crate) fn is_kept(
     info: &EffectInfo,
     reweighted: &JackknifeResult,
@@ -281,7 +278,7 @@ pub(crate) fn base_parameters(covariance: &Covariance) -> Vec<BaseParameter> {
             _ => f64::NEG_INFINITY,
         };
         let value = (x * scale).max(reached_n);
-        // Only the surface may lie below zero.
+        // Only the surface can be negative.
         let least = if role == ParameterRole::Surface { f64::NEG_INFINITY } else { 0.0 };
         let low = ((x - half) * scale).max(reached_n).max(least);
         let high = (open_above.map_or(x + half, |open| open.max(x + half)) * scale).max(value);

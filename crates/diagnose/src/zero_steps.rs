@@ -1,4 +1,4 @@
-//! Steps of the sensor's zero: candidates, removal of weak ones, and their report.
+//! Steps of the sensor zero: finds candidates, removes insignificant ones, and reports them as causes.
 
 use crate::base_law_fit::{PreparedRecordings, SAME_EVENT_S};
 use crate::diagnosis_json::{Cause, Estimate};
@@ -15,18 +15,18 @@ use stylet_record::{QualityKind, QualityNote};
 use stylet_stats::Z95;
 use stylet_tissue::{AnyEffect, Effect, ForceBias};
 
-/// A jump within this time (s) of a velocity jump may be friction.
+/// Time (s) around a velocity jump within which a force jump may be friction.
 const VELOCITY_JUMP_S: f64 = 0.06;
 
-/// Candidates for steps.
+/// Candidate steps of the zero.
 pub(crate) struct StepCandidates {
-    /// Steps at every jump up, and an offset of every recording but the first, per recording.
+    /// Per recording, steps at every upward jump; and an offset at the start of every recording except the first.
     pub steps: Vec<Vec<ZeroStep>>,
     /// Drops, which may be ruptures or steps: recording and step, most significant first.
     pub drops: Vec<(usize, ZeroStep)>,
 }
 
-/// Jumps of the force in all recordings, but for those at a velocity jump.
+/// Force jumps in all recordings except those at velocity jumps.
 pub(crate) fn zero_step_candidates(prepared: &PreparedRecordings) -> StepCandidates {
     let mut drops: Vec<(f64, usize, ZeroStep)> = Vec::new();
     let mut steps: Vec<Vec<ZeroStep>> = Vec::new();
@@ -48,7 +48,7 @@ pub(crate) fn zero_step_candidates(prepared: &PreparedRecordings) -> StepCandida
     StepCandidates { steps, drops: drops.into_iter().map(|(_, r, step)| (r, step)).collect() }
 }
 
-/// The drops that are no rupture of a fit.
+/// The drops that are not assigned to a rupture of a fit.
 pub(crate) fn unassigned<'a>(
     drops: &'a [(usize, ZeroStep)],
     f: &'a Fit,
@@ -58,7 +58,7 @@ pub(crate) fn unassigned<'a>(
         .filter(|(r, s)| f.model.rupture_times_s[*r].iter().all(|t| (t - s.time_s).abs() > SAME_EVENT_S))
 }
 
-/// Adds a step to a list, or removes it from there.
+/// The steps with one step added, or removed if it is already there.
 pub(crate) fn toggled(steps: &[Vec<ZeroStep>], (r, step): (usize, ZeroStep)) -> Vec<Vec<ZeroStep>> {
     let mut steps = steps.to_vec();
     let count = steps[r].len();
@@ -70,7 +70,7 @@ pub(crate) fn toggled(steps: &[Vec<ZeroStep>], (r, step): (usize, ZeroStep)) -> 
     steps
 }
 
-/// The steps with further ones at the jumps of a fit's residual; `None` when there are none.
+/// The steps with further ones at jumps of the residual of a fit; `None` when there are none.
 pub(crate) fn with_steps_in_residual(
     steps: &[Vec<ZeroStep>],
     f: &Fit,
@@ -107,7 +107,7 @@ fn step_sds(f: &Fit, data: &FitData) -> Vec<Vec<f64>> {
     f.model.zero_steps.iter().enumerate().map(|(r, s)| (0..s.len()).map(|k| sd(r, k)).collect()).collect()
 }
 
-/// Removes the least significant step as long as it does not pay for its two parameters, under the noise of this source.
+/// Removes the least significant step as long as its gain, under noise estimated as `noise`, is below the penalty of its two parameters.
 pub(crate) fn remove_weak_steps(search: &mut Search, noise: NoiseSource) {
     while search.best.model.zero_step_count() > 0 {
         let data = search.data.with_estimated_noise(&search.best.residuals.residual_n, noise);
@@ -129,15 +129,15 @@ pub(crate) fn remove_weak_steps(search: &mut Search, noise: NoiseSource) {
     }
 }
 
-/// The zero of the sensor as the diagnosis reports it.
+/// The sensor zero as the diagnosis reports it.
 pub(crate) struct ZeroStepReport {
     /// One cause for all steps, with time and size of the largest.
     steps: Option<Cause>,
-    /// The largest offset, where the offset differs between recordings.
+    /// The largest offset, if offsets differ between recordings.
     offset: Option<Cause>,
-    /// The offset before the first step belongs to the steps: the zero is right after one of them.
+    /// Whether the offset before the first step is part of the steps, because the zero is correct after one of them.
     holds_offset: bool,
-    /// A note on every recording with steps or an offset of its own.
+    /// Notes on recordings with steps or an offset of their own.
     pub notes: Vec<Option<QualityNote>>,
 }
 
@@ -165,14 +165,14 @@ impl ZeroStepReport {
         }
     }
 
-    /// The causes together with those of the steps.
+    /// The causes and those of the steps.
     pub(crate) fn with_causes(&self, causes: &[Cause]) -> Vec<Cause> {
         causes.iter().chain(&self.offset).chain(&self.steps).cloned().collect()
     }
 
-    /// Adds the causes; an offset before steps to the right zero is no cause of its own.
+    /// Adds the causes of the zero; an offset that steps correct later is not a separate cause.
     pub(crate) fn add_to(&mut self, causes: &mut Vec<Cause>) {
-        // The offset of a recording is that of the first and its own difference.
+        // The offset of a recording is that of the first one plus its own difference.
         let common = causes.iter().find(|c| c.effect == ForceBias::ID).cloned();
         if let (Some(offset), Some(common)) = (&mut self.offset, &common) {
             widen(offset, common);
@@ -195,13 +195,13 @@ fn widen(cause: &mut Cause, other: &Cause) {
     }
 }
 
-/// The zero of one recording.
+/// The sensor zero of one recording.
 struct RecordedZero {
-    /// Offset at the start with its standard deviation relative to the first recording.
+    /// Offset (N) at the start, and its standard deviation relative to the first recording.
     offset_n: (f64, f64),
     /// Whether the offset differs from that of the first recording.
     differs: bool,
-    /// Steps with the standard deviations of their sizes.
+    /// Steps and standard deviations (N) of their sizes.
     steps: Vec<(ZeroStep, f64)>,
     /// Half the sampling interval in s.
     half_step_s: f64,
@@ -257,7 +257,7 @@ fn recorded_zeros(search: &Search, sds: &[Vec<f64>]) -> Vec<RecordedZero> {
     search.data.recordings.iter().zip(&search.best.model.zero_steps).zip(sds).map(one).collect()
 }
 
-/// Offset of the model in N that all recordings share; zero without one.
+/// Offset (N) that all recordings share; zero without one.
 fn offset_n(search: &Search) -> f64 {
     let bias = search.best.model.effects.iter().filter_map(|e| match e.effect()? {
         AnyEffect::ForceBias(bias) => Some(bias.force_n),
@@ -266,8 +266,8 @@ fn offset_n(search: &Search) -> f64 {
     bias.sum()
 }
 
-/// The steps of a single recording as effects of the extended scenario, with the offset that belongs to them. Those of
-/// several recordings are at different times, and no property of the next insertion.
+/// The steps of a single recording as effects of the extended scenario, with the offset that is part of them. Steps of several recordings
+/// are at different times and do not recur in the next insertion.
 pub(crate) fn zero_effects(search: &Search, causes: &[Cause]) -> Vec<AnyEffect> {
     let [steps] = &search.best.model.zero_steps[..] else { return Vec::new() };
     let offset = offset_n(search);
@@ -285,7 +285,7 @@ fn steps_cause(search: &Search, zeros: &[RecordedZero]) -> Option<Cause> {
     Some(cause(search, &effect, &[half_s, Z95 * sd], |at_start| !at_start))
 }
 
-/// The largest offset as a cause, where the offset differs between recordings.
+/// The largest offset as a cause, if offsets differ between recordings.
 fn offset_cause(search: &Search, zeros: &[RecordedZero]) -> Option<Cause> {
     zeros.iter().find(|z| z.differs)?;
     let largest = zeros.iter().max_by(|a, b| a.offset_n.0.abs().total_cmp(&b.offset_n.0.abs()))?;
@@ -293,8 +293,8 @@ fn offset_cause(search: &Search, zeros: &[RecordedZero]) -> Option<Cause> {
     Some(cause(search, &ForceBias { force_n }.into(), &[Z95 * sd_n], |at_start| at_start))
 }
 
-/// A cause with these half widths; its gain is the loss without the steps that `removed` selects by whether they are before the
-/// first sample.
+/// A cause with these half widths. Its gain is the loss without the steps that `removed` selects; its argument says whether a step is
+/// before the first sample.
 fn cause(search: &Search, effect: &AnyEffect, half_widths: &[f64], removed: impl Fn(bool) -> bool) -> Cause {
     let (model, data) = (&search.best.model, &search.data);
     let mut without = model.clone();

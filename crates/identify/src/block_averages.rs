@@ -1,7 +1,7 @@
-//! A recording as means over short blocks of time.
+//! Averages a recording over blocks of [`BLOCK_S`]: mean force, times, flags and motion per block, the input of every fit.
 //!
-//! The mean over the block in which a layer ruptures lies between the forces before and after, so a predicted
-//! mean is continuous in the rupture time; and a recording at 1 kHz costs no more than one at 200 Hz.
+//! A rupture inside a block gives a mean between the forces before and after it, so the predicted mean is continuous in the rupture time.
+//! The cost of a fit does not grow with the sampling rate.
 
 use crate::motion::{JumpAppearance, Motion, MotionPiece};
 use std::sync::{Arc, OnceLock};
@@ -11,15 +11,15 @@ use stylet_tissue::effect::SGN_DEAD_BAND_MPS;
 
 /// Block length in s: short compared with layers, relaxation and ripple, several samples at 200 Hz and more.
 pub const BLOCK_S: f64 = 0.02;
-/// A time step longer than this many sampling intervals is a gap.
+/// A time step longer than this many sampling intervals is a gap; a single jittered step stays below it.
 const GAP_STEPS: f64 = 1.8;
-/// A gap of at most this many blocks stays within a block; its other samples are compared.
+/// A gap of at most this many blocks is bridged within its block, which is still compared by its remaining samples.
 const MAX_MISSING_BLOCKS: f64 = 1.0;
-/// Longer gaps, in s, are not filled with blocks.
+/// Gaps up to this length (s) are filled with blocks that are not compared; longer ones stay empty.
 const MAX_BRIDGED_S: f64 = 2.0;
-/// A sample this close (share of a sampling interval) to a velocity jump may have either velocity.
+/// A sample within this distance (sampling intervals) of a velocity jump may have the velocity of either side.
 const JUMP_MARGIN_STEPS: f64 = 0.03;
-/// Window in s over which the force magnitude is smoothed.
+/// Window (s) over which the force is averaged for [`BlockAverages::abs_force_n`].
 const FORCE_SMOOTHING_S: f64 = 0.1;
 
 /// One recording in blocks.
@@ -31,15 +31,15 @@ pub struct BlockAverages {
     pub end_s: Vec<f64>,
     /// Mean recorded force in N.
     pub force_n: Vec<f64>,
-    /// Whether the block is compared.
+    /// Whether the block enters the likelihood.
     pub used: Vec<bool>,
-    /// Whether the noise memory restarts here because the preceding block is unknown.
+    /// Whether the noise model restarts at this block because the preceding one is missing or not compared.
     pub memory_reset: Vec<bool>,
-    /// Magnitude of the smoothed recorded force in N.
+    /// Magnitude of the recorded force in N, averaged over 0.1 s.
     pub abs_force_n: Vec<f64>,
     /// Additional standard deviation in N of the block mean, from jumps between samples and unmodelled force.
     pub extra_sd_n: Vec<f64>,
-    /// Times in s at which the force drops because something breaks.
+    /// Times in s at which the predicted force drops because an elastic element breaks.
     break_times_s: Vec<f64>,
     /// Standard deviation in N of unmodelled force around every block; empty for none.
     unmodelled_sd_n: Vec<f64>,
@@ -61,8 +61,8 @@ pub struct BlockAverages {
     exact_pieces: Arc<OnceLock<Arc<Vec<MotionPiece>>>>,
 }
 
-/// Mean force over a time span. With missing samples each remaining one represents the times nearest to it, so
-/// that a ramp or a step keeps its mean.
+/// Mean force over a time span. With missing samples (`whole` is false), each remaining sample is weighted by the time nearest to it, so
+/// that the mean of a ramp or a step is unbiased.
 fn time_weighted_mean(
     (from_s, to_s): (f64, f64),
     samples: impl Iterator<Item = (f64, f64)>,
@@ -114,7 +114,7 @@ impl BlockAverages {
         let mut i = 0;
         let mut raw_block = Vec::with_capacity(n);
         while i < n {
-            // Missing samples after the start of a block occupy places in it.
+            // Samples that are missing inside a block still occupy places in it.
             let spans = |k: usize| {
                 let gap = t[k] - t[k - 1];
                 let missing = gap > GAP_STEPS * step_s
@@ -165,8 +165,7 @@ impl BlockAverages {
         b
     }
 
-    /// Fills a gap up to `to_s` (s) with blocks that are not compared: the model continues there and may
-    /// rupture.
+    /// Fills a gap up to `to_s` (s) with blocks that are not compared; the model still moves, and may rupture, during them.
     fn bridge_gap(&mut self, to_s: f64, length_s: f64) {
         let (Some(&end), Some(&force)) = (self.end_s.last(), self.force_n.last()) else { return };
         let gap_s = to_s - end;
@@ -182,8 +181,8 @@ impl BlockAverages {
         }
     }
 
-    /// Excludes blocks with a sample at a velocity jump, or within its timing uncertainty: it may have either
-    /// velocity.
+    /// Excludes blocks in which a sample lies at a velocity jump or within its timing uncertainty: the sample may have the velocity of
+    /// either side.
     fn exclude_jump_blocks(&mut self, t: &[f64]) {
         let motion = Arc::clone(&self.motion);
         for jump in &motion.jumps {
@@ -198,7 +197,7 @@ impl BlockAverages {
         }
     }
 
-    /// Blocks of `m` blocks each, for screening.
+    /// The recording in blocks `m` times as long, for ranking start values.
     #[must_use]
     pub fn coarsened(&self, m: usize) -> Self {
         let mut b = Self {
@@ -234,7 +233,7 @@ impl BlockAverages {
         b
     }
 
-    /// Computes the derived columns.
+    /// Computes `memory_reset`, `abs_force_n`, `extra_sd_n` and `pieces` from the other columns.
     fn derive_columns(&mut self) {
         let n = self.len();
         self.memory_reset = (0..n)
@@ -252,8 +251,8 @@ impl BlockAverages {
         self.pieces = Arc::new(self.cut_motion(JumpAppearance::BetweenSamples));
     }
 
-    /// The same blocks with times (s) at which the force drops because something breaks: the break lies between
-    /// two samples, and its time is known to within a sampling interval.
+    /// The same blocks with the times (s) at which an elastic element breaks. Each adds to `extra_sd_n`, because a break is located only to
+    /// within a sampling interval.
     #[must_use]
     pub fn with_break_times(mut self, falls_s: Vec<f64>) -> Self {
         self.break_times_s = falls_s;
@@ -261,7 +260,7 @@ impl BlockAverages {
         self
     }
 
-    /// The same blocks with an unmodelled force of the given standard deviation (N) around each.
+    /// The same blocks with the standard deviation (N) of an unmodelled force per block, added to `extra_sd_n`.
     #[must_use]
     pub fn with_unmodelled_sd(mut self, sd_n: Vec<f64>) -> Self {
         self.unmodelled_sd_n = sd_n;
@@ -279,8 +278,8 @@ impl BlockAverages {
         self.break_times_s = falls;
     }
 
-    /// A jump lies between two samples: the mean of its block is uncertain by the jump times one sampling
-    /// interval.
+    /// Adds the uncertainty of a force jump to its block: size of the jump times the standard deviation of its time, which is uniform over
+    /// one sampling interval.
     fn add_jump_uncertainty(&mut self, at_s: f64) {
         let k = self.block_at(at_s);
         if k > 0 && k + 1 < self.len() {
@@ -294,8 +293,8 @@ impl BlockAverages {
         }
     }
 
-    /// The same blocks for a force delayed by `late_s`: its jumps lie between other samples, and where position
-    /// noise leaves open between which, the block mean is uncertain.
+    /// The same blocks for a force delayed by `delay_s`: jumps are delayed too, and one whose timing uncertainty spans a sample makes the
+    /// block means on both sides uncertain.
     #[must_use]
     pub fn with_delayed_jump_uncertainty(&self, delay_s: f64) -> Self {
         let mut b = self.clone();
@@ -326,9 +325,9 @@ impl BlockAverages {
         }
     }
 
-    /// Smooth motion pieces for a force delayed by `late_s`. Jumps are placed at their exact times if the force
-    /// is low-pass filtered (`smeared`) or delayed; if it is delayed, not filtered, and `placed` is given, at
-    /// the sample midpoints for that delay.
+    /// Smooth motion pieces for a force delayed by `delay_s`. Velocity jumps are placed at the sample midpoints if the force is neither
+    /// delayed nor low-pass filtered (`smeared`), at the sample midpoints for the delay `jump_delay_s` if that is given and the force is
+    /// delayed but not filtered, and otherwise at their exact times.
     #[must_use]
     pub fn motion_pieces(
         &self,
@@ -362,8 +361,8 @@ impl BlockAverages {
         Self { force_n, ..self.clone() }
     }
 
-    /// Residuals (N) of the samples for block residuals `e`: the block residual plus the sample's deviation
-    /// from the course of the block means.
+    /// Residuals (N) per sample for block residuals `e` (N): the sample minus the predicted block mean, interpolated linearly within the
+    /// block.
     #[must_use]
     pub fn sample_residuals(&self, e: &[f64]) -> Vec<f64> {
         let n = self.len();
@@ -376,7 +375,7 @@ impl BlockAverages {
                 before = block;
                 let k = block as usize;
                 let (lo, hi) = (k.saturating_sub(1), (k + 1).min(n - 1));
-                // Predicted means are interpolated with the slope of their neighbours.
+                // Slope between the predicted means of the two neighbouring blocks.
                 let predicted = |k: usize| self.force_n[k] - e[k];
                 let slope =
                     (predicted(hi) - predicted(lo)) / ((hi - lo).max(1) * self.samples_per_block) as f64;
@@ -386,8 +385,7 @@ impl BlockAverages {
             .collect()
     }
 
-    /// Standard deviation in N of samples about the course of the block means; a force trend within a block is
-    /// not noise.
+    /// Standard deviation in N of the samples within their blocks, after removal of the linear trend between block means.
     #[must_use]
     pub fn within_block_sd_n(&self) -> f64 {
         if self.samples_per_block < 2 {
@@ -401,7 +399,7 @@ impl BlockAverages {
         let mut variances: Vec<f64> =
             sums.iter().filter(|s| s.0 >= 2.0).map(|(n, square)| square / n).collect();
         variances.sort_unstable_by(f64::total_cmp);
-        // Mean without the largest tenth, which contains ruptures and jumps.
+        // Trimmed mean: the largest tenth contains ruptures and jumps.
         let kept = variances.len() * 9 / 10;
         (variances[..kept].iter().sum::<f64>() / kept.max(1) as f64).sqrt()
     }

@@ -1,9 +1,8 @@
-//! Estimates a force delay to a fraction of the sampling interval.
+//! Refines an estimated force delay to a fraction of the sampling interval by a grid search.
 //!
-//! Friction jumps with the velocity, and each sample lies before or after a jump. A delay moves samples across
-//! jumps one by one, so the likelihood has a step for each, which derivatives do not see. The delay found with
-//! jumps at their exact times is therefore refined on a grid: jumps are placed between the samples given by a
-//! grid delay, and the smooth part of the force is fitted again.
+//! Friction jumps with the velocity. As the delay grows, samples cross such a jump one by one, so the likelihood is piecewise constant in
+//! the delay and has no useful derivative. On a grid of delays the jumps are placed between the corresponding samples and the smooth part
+//! of the force is refitted.
 
 use crate::fit::{Effort, Fit, fit};
 use crate::likelihood::{FitData, residuals};
@@ -11,9 +10,9 @@ use crate::model::{EffectTerm, Model};
 use stylet_stats::parallel::*;
 use stylet_tissue::Effect;
 
-/// Grid spacings as shares of the sampling interval.
+/// Grid spacings of the two passes, as shares of the sampling interval.
 const GRID_SPACINGS: [f64; 2] = [0.1, 0.03];
-/// Grid points on either side.
+/// Grid points on either side of the current delay.
 const GRID_HALF_POINTS: i32 = 12;
 
 /// Index of the model's delay effect, if it has the delay as its only parameter.
@@ -28,8 +27,8 @@ pub fn delay_s(model: &Model) -> f64 {
     model.compile(0).map_or(0.0, |c| c.delay_s)
 }
 
-/// The fit with jumps of the delayed force placed between samples, and the data with the remaining timing
-/// uncertainty; `None` when the force is not delayed or the fit does not improve.
+/// Best fit over the delay grid, and the data with the timing uncertainty that remains. `None` when the force is not delayed or the fit
+/// does not improve.
 #[must_use]
 pub fn refine_delay(found: &Fit, data: &FitData) -> Option<(Fit, FitData)> {
     let step_s = data.recordings.iter().map(|b| b.sample_step_s).fold(f64::INFINITY, f64::min);

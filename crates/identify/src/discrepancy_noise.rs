@@ -1,22 +1,20 @@
-//! White noise equivalent to the residuals of an incomplete model.
+//! White noise equivalent to the correlated residuals of an incomplete model.
 //!
-//! Measured insertions differ from any model by up to fifty times the sensor noise, correlated over about a
-//! second. Under sensor noise a fit would follow the first unmodelled detail; here every independent stretch
-//! counts once. Residuals `e` with standard deviation `s` and integrated autocorrelation time `c` (in blocks)
-//! hold `n/c` independent values in `n` blocks, which is white noise of standard deviation `s sqrt(c)`. It
-//! decreases as the model improves.
+//! Model discrepancy reaches fifty times the sensor noise and is correlated over about a second; with the sensor noise, a fit would overfit
+//! it. `n` residuals with standard deviation `s` and integrated autocorrelation time `c` (blocks) contain `n/c` independent values, the
+//! information of white noise with standard deviation `s sqrt(c)`. The estimate decreases as the model improves.
 
 use crate::block_averages::BlockAverages;
 use crate::noise::Noise;
 
-/// Largest lag in s of the autocorrelation sum.
+/// Largest lag (s) of the autocorrelation sum: several correlation times of the observed discrepancy.
 const MAX_LAG_S: f64 = 4.0;
-/// The sum ends at the first autocorrelation below this.
+/// The autocorrelation sum ends at the first value below this.
 const MIN_CORRELATION: f64 = 0.05;
-/// Residuals are clipped at this many robust standard deviations: rupture windows are not noise.
+/// Residuals are clipped at this many robust standard deviations, which limits the influence of ruptures.
 const CLIP_SDS: f64 = 4.0;
 
-/// White noise equivalent to residuals `e` (N), one column per recording, with a lower bound of `floor_n`.
+/// White noise equivalent to residuals `e` (N, one column per recording), at least `floor_n` (N).
 #[must_use]
 pub fn discrepancy_noise(blocks: &[BlockAverages], e: &[Vec<f64>], floor_n: f64) -> Noise {
     let mut sizes: Vec<f64> = Vec::new();

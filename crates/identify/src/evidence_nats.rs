@@ -1,7 +1,7 @@
-//! Evidence differences in nats, typed by the noise model they were computed with.
+//! Log evidence differences in nats, typed by the noise model under which they were computed.
 //!
-//! Log-likelihoods are comparable under the same noise only: the gain of a model is large under the small noise
-//! estimated in quiet stretches, and small under the residual noise of the larger model.
+//! Values on different bases must not be compared: the same model gains much under the small noise of quiet stretches and little under the
+//! residual noise of the larger model. The type parameter rules that out.
 
 use core::cmp::Ordering;
 use core::marker::PhantomData;
@@ -11,7 +11,7 @@ use core::ops::{Neg, Sub};
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct Nats<B>(f64, PhantomData<B>);
 
-/// Gain under the residual noise of the larger of two models, priors and ruptures of both included.
+/// Basis: noise estimated from the residuals of the larger of two models; priors and rupture terms of both are included.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 pub struct UnderLargerModelNoise;
 
@@ -28,8 +28,7 @@ impl<B> Nats<B> {
         self.0
     }
 
-    /// Whether the gain exceeds a penalty in nats; the penalty of fitted parameters does not depend on the
-    /// basis.
+    /// Whether the gain exceeds a penalty (nats), which does not depend on the basis.
     #[must_use]
     pub fn exceeds(self, price: f64) -> bool {
         self.0 > price

@@ -1,8 +1,8 @@
 //! Detects drops of the measured force by local regressions with a step.
 //!
-//! Around every block the force is regressed on `1, t, t after, v, sgn v` and a step, over 0.2 s and over 0.7 s
-//! on each side; the block itself is excluded because a step inside it is averaged. Friction and stiffness are
-//! smooth or follow the velocity; a remaining drop is a rupture of a layer or of an unmodelled structure.
+//! Around every block, the force over 0.2 s and over 0.7 s on each side is regressed on `1, t, max(t, 0), v, sgn v` and a step; the block
+//! itself is excluded because its mean contains part of the step. Friction and stiffness are covered by the other regressors, so a
+//! significant negative step is the rupture of a layer or of an unmodelled structure.
 
 use crate::block_averages::BlockAverages;
 use stylet_stats::linear_algebra::SymmetricMatrix;
@@ -17,15 +17,15 @@ pub struct ForceDrop {
     pub position_m: f64,
     /// Size in N.
     pub size_n: f64,
-    /// Size in standard deviations.
+    /// Size in standard deviations of its estimate.
     pub score: f64,
 }
 
-/// Half widths of the regression window in s.
+/// Half widths of the regression window in s: the short one separates close ruptures, the long one finds small drops.
 const WINDOWS_S: [f64; 2] = [0.2, 0.7];
-/// Smallest score of a drop.
+/// Smallest score of a drop, in standard deviations.
 const MIN_SCORE: f64 = 5.0;
-/// Drops closer than this in s are one.
+/// Drops closer than this (s) count as one.
 const MIN_SEPARATION_S: f64 = 0.12;
 /// Number of regressors.
 const REGRESSORS: usize = 6;
@@ -83,7 +83,7 @@ fn score_peaks(b: &BlockAverages, motion: &[(f64, f64)], half: usize) -> Vec<For
         .collect()
 }
 
-/// Step at block `k`: size, standard deviation for unit noise, noise.
+/// Regression with a step at block `k`: step (N), its standard deviation for unit noise, residual standard deviation (N).
 fn fit_step(b: &BlockAverages, motion: &[(f64, f64)], k: usize, half: usize) -> (f64, f64, f64) {
     let (from, to) = (k - half, k + half + 1);
     let v0 = motion[k].1;
@@ -113,7 +113,7 @@ fn fit_step(b: &BlockAverages, motion: &[(f64, f64)], k: usize, half: usize) -> 
     if sides[0] < 4 || sides[1] < 4 {
         return (0.0, f64::INFINITY, f64::INFINITY);
     }
-    // Regularises friction that hardly changes.
+    // Ridge for velocity terms that hardly change within the window.
     h.add(3, 3, 1e-3 * count);
     h.add(4, 4, 1e-3 * count);
     let factor = h.cholesky();

@@ -1,17 +1,16 @@
-//! Jumps of the measured force between two samples, of either sign: candidates for steps of the sensor's zero.
+//! Detects jumps of the measured force between two samples, of either sign: candidates for steps of the sensor zero.
 
 use crate::block_averages::BlockAverages;
 use crate::force_drops::{ForceDrop, detect_force_drops};
 use stylet_stats::order_statistics::median;
 
-/// Samples on each side whose means localise a jump.
+/// Samples on each side whose means are compared to localise a jump.
 const LOCAL_SAMPLES: usize = 6;
-/// Blocks around a detected jump in which it is localised.
+/// Distance (blocks) around a detected drop within which the jump is localised.
 const SEARCH_BLOCKS: usize = 2;
-/// Share of its size by which the force must change between the samples on both sides; a fast ramp changes by less.
+/// Share of its fitted size by which the force must change between the two sides; a fast ramp changes by less.
 const MIN_LOCAL_SHARE: f64 = 0.6;
-/// Size of a jump in standard deviations of the same difference elsewhere in the recording: noise of any colour has no such
-/// jumps.
+/// Smallest jump, in standard deviations of the same difference over the recording; coloured noise does not reach it.
 const MIN_LOCAL_SD: f64 = 6.0;
 
 /// A jump between two samples.
@@ -21,7 +20,7 @@ pub struct ForceJump {
     pub time_s: f64,
     /// Size in N; negative for a drop.
     pub size_n: f64,
-    /// Size in standard deviations.
+    /// Size in standard deviations of its estimate.
     pub score: f64,
 }
 
@@ -44,7 +43,7 @@ fn difference(force: &[f64], i: usize) -> f64 {
     stylet_stats::mean(&force[i..i + LOCAL_SAMPLES]) - stylet_stats::mean(&force[i - LOCAL_SAMPLES..i])
 }
 
-/// Robust standard deviation in N of these differences: the median absolute deviation of normal numbers is 0.6745 of it.
+/// Robust standard deviation in N of these differences: median absolute deviation over 0.6745, its value for a unit normal.
 fn difference_sd_n(force: &[f64]) -> f64 {
     let mut all: Vec<f64> = (LOCAL_SAMPLES..(force.len() + 1).saturating_sub(LOCAL_SAMPLES))
         .map(|i| difference(force, i))
@@ -54,7 +53,7 @@ fn difference_sd_n(force: &[f64]) -> f64 {
     median(&mut all) / 0.6745
 }
 
-/// The jump between the two samples where it is; `None` where the force does not jump by at least `min_n` N.
+/// The jump between the two samples with the largest difference; `None` if it is below `min_n` (N) or a ramp.
 fn localised(b: &BlockAverages, drop: &ForceDrop, sign: f64, min_n: f64) -> Option<ForceJump> {
     let (time, force) = (&b.sample_time_s, &b.sample_force_n);
     let reach_s = (SEARCH_BLOCKS as f64 + 0.5) * b.samples_per_block as f64 * b.sample_step_s;

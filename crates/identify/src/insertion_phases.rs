@@ -1,23 +1,22 @@
-//! Phases of the motion and abrupt force changes, from raw samples: drops during insertion, releases during
-//! retraction.
+//! Phases of the motion and abrupt force changes from raw samples: drops during insertion, releases during retraction.
 //!
-//! Model-free; thresholds are shares of the largest force and multiples of the noise.
+//! No model is used; thresholds are shares of the largest force and multiples of the noise.
 
 use stylet_record::Recording;
 
-/// Shortest window in s in which a drop happens.
+/// Shortest window (s) over which a drop is measured.
 const DROP_WINDOW_S: f64 = 0.06;
 /// Smallest drop or release, as a share of the largest force.
 const MIN_SHARE_OF_MAX_FORCE: f64 = 0.06;
 /// Smallest drop or release, in standard deviations of the noise.
 const MIN_NOISE_SDS: f64 = 12.0;
-/// Smallest share of a drop within two neighbouring intervals.
+/// Share of a drop that must occur within two neighbouring sampling intervals.
 const ABRUPT_SHARE: f64 = 0.7;
-/// A fall that continues by this share over the same time again is not a drop.
+/// Largest continuation of a drop, as a share of its size over an equal time afterwards; relaxation continues by more.
 const MAX_CONTINUED_SHARE: f64 = 0.2;
-/// Smallest drop of the first layer, as a share of the largest one; smaller ones before it are ignored.
+/// Smallest drop of the first layer, as a share of the largest drop; smaller ones before it are taken for unmodelled structures.
 const MIN_FIRST_RUPTURE_SHARE: f64 = 0.4;
-/// Steps within this travel (m) during retraction belong to one release.
+/// Force steps within this travel (m) during retraction are merged into one release.
 const MERGE_RELEASES_M: f64 = 2.5e-3;
 
 /// Phases of the motion, as sample indices.
@@ -49,7 +48,7 @@ pub struct Release {
     pub size_n: f64,
 }
 
-/// Standard deviation of the noise from differences of neighbouring samples, which a slow force hardly changes.
+/// Standard deviation (N) of the noise from the median absolute difference of neighbouring samples, which a slow force hardly changes.
 #[must_use]
 pub fn noise_n(force_n: &[f64]) -> f64 {
     let mut steps: Vec<f64> = force_n.windows(2).map(|p| (p[1] - p[0]).abs()).collect();
@@ -88,8 +87,8 @@ fn window_end(t: &[f64], i: usize) -> usize {
     j
 }
 
-/// Whether most of a fall happens within three neighbouring samples and then ends (`after`: the fall over the
-/// same time again). Relaxation after a stop is fast but continues.
+/// Whether most of a fall occurs within three neighbouring samples and then ends. `after` is the fall (N) over an equal time afterwards.
+/// Relaxation after a stop is as fast but continues.
 fn is_abrupt(f: &[f64], after: f64) -> bool {
     let fall = f[0] - f[f.len() - 1];
     after < MAX_CONTINUED_SHARE * fall
@@ -171,7 +170,7 @@ pub fn releases(recording: &Recording, phases: &InsertionPhases, layers: usize) 
     out
 }
 
-/// Position at which the force finally leaves zero: an estimate of the surface.
+/// Estimate of the surface: position (m) of the last sample below the noise before the force rises.
 #[must_use]
 pub fn contact_m(recording: &Recording, phases: &InsertionPhases) -> f64 {
     let f = &recording.force_n;

@@ -1,4 +1,4 @@
-//! The log posterior of a model: whitened residuals, rupture terms, priors.
+//! Negative log posterior of a model: Huber loss of whitened residuals, rupture terms, priors.
 
 use crate::block_averages::BlockAverages;
 use crate::forward_model::{
@@ -61,7 +61,7 @@ impl FitData {
         Self { noise: Arc::new(noise), plans: Arc::default(), ..self.clone() }
     }
 
-    /// Number of blocks replayed so far for these recordings: a machine-independent measure of cost.
+    /// Number of blocks replayed so far: a measure of cost that does not depend on the machine.
     #[must_use]
     pub fn blocks_replayed(&self) -> u64 {
         self.replayed.load(Ordering::Relaxed)
@@ -112,11 +112,11 @@ pub struct Residuals {
     pub innovations: Vec<Vec<f64>>,
     /// Ruptures, per recording and layer.
     pub ruptures: Vec<Vec<RuptureEvent>>,
-    /// Negative log posterior in nats, without the noise's normalisation.
+    /// Negative log posterior in nats, without the normalisation of the noise density.
     pub nats: f64,
 }
 
-/// Motion pieces for a model's jump timing.
+/// Motion pieces with velocity jumps placed as the model's delay and low-pass filters require.
 #[must_use]
 pub fn motion_pieces(model: &CompiledModel, blocks: &BlockAverages) -> Arc<Vec<MotionPiece>> {
     blocks.motion_pieces(model.smears_jumps, model.delay_s, model.jump_delay_s)
@@ -140,8 +140,8 @@ pub fn replay(model: &Model, data: &FitData, r: usize) -> Option<ReplayResult> {
     out.force_n.iter().all(|f| f.is_finite()).then_some(out)
 }
 
-/// Adds the timing uncertainty of break points of the model's effects: a break lies between two samples, and a
-/// depth shared by all recordings places it anywhere between them.
+/// Adds the timing uncertainty of the model's break points to the block means: a break lies between two samples, but its depth, shared by
+/// all recordings, can place it anywhere between them.
 #[must_use]
 pub fn with_break_uncertainty(model: &Model, data: &FitData) -> FitData {
     let falling = |(r, b): (usize, &BlockAverages)| {
@@ -153,7 +153,7 @@ pub fn with_break_uncertainty(model: &Model, data: &FitData) -> FitData {
     if same { data.clone() } else { data.with_recordings(blocks) }
 }
 
-/// A replay with its checkpoints, from which predictions of similar models are computed.
+/// A replay of one recording with checkpoints, from which predictions of similar models are computed.
 pub struct ReplayCache {
     compiled: CompiledModel,
     pieces: Arc<Vec<MotionPiece>>,
@@ -172,11 +172,11 @@ impl ReplayCache {
         Some(Self { compiled, pieces, incremental: replay_cache })
     }
 
-    /// As [`replay`], for a model that differs in base parameters, geometry or a rupture time only.
+    /// As [`replay`], for a model that differs only in base parameters, geometry or a rupture time.
     #[must_use]
     pub fn replay(&self, model: &Model, data: &FitData, r: usize) -> Option<ReplayResult> {
         let compiled = model.compile(r)?;
-        // On average half of the recording is replayed.
+        // On average half of the recording is replayed again.
         data.count_replayed(data.recordings[r].len() as u64 / 2);
         let mut out = self.incremental.replay_neighbour(
             &self.compiled,
@@ -189,13 +189,13 @@ impl ReplayCache {
         out.force_n.iter().all(|f| f.is_finite()).then_some(out)
     }
 
-    /// Rupture times (s) of the law itself.
+    /// Rupture times (s) by the model's own criterion.
     #[must_use]
     pub fn free_rupture_times(&self) -> Vec<f64> {
         free_rupture_times(&self.compiled, &self.pieces)
     }
 
-    /// Nats of the recording with other rupture times: residuals and rupture terms under the current noise.
+    /// Objective (nats) of the recording with other rupture times: loss of the residuals and rupture terms, without priors.
     #[must_use]
     pub fn nats_with_ruptures(&self, model: &Model, data: &FitData, r: usize, rupture_times: &[f64]) -> f64 {
         let b = &data.recordings[r];
@@ -238,7 +238,7 @@ pub fn residuals(model: &Model, data: &FitData) -> Option<Residuals> {
     Some(all)
 }
 
-/// Negative log posterior of given residuals in nats.
+/// Negative log posterior in nats of given residuals.
 #[must_use]
 pub fn neg_log_posterior(model: &Model, r: &Residuals) -> f64 {
     let mut sum: f64 =
@@ -247,13 +247,13 @@ pub fn neg_log_posterior(model: &Model, r: &Residuals) -> f64 {
     sum + prior_nats(model)
 }
 
-/// The rupture terms alone, in nats.
+/// Rupture terms of the objective, in nats.
 #[must_use]
 pub fn rupture_nats(model: &Model, r: &Residuals) -> f64 {
     r.ruptures.iter().flatten().map(|e| evaluate_rupture(e, &model.scatter).nats).sum()
 }
 
-/// The prior terms alone, in nats.
+/// Prior terms of the objective, in nats.
 #[must_use]
 pub fn prior_nats(model: &Model) -> f64 {
     let of = |n: &Parameter, x: f64| {

@@ -1,27 +1,26 @@
-//! Assigns force drops to layers: the cheapest assignment in layer order, by dynamic programming.
+//! Assigns detected force drops to layers: the assignment with the lowest cost in layer order, by dynamic programming.
 //!
-//! A layer is expected to rupture where its force or its far interface says, within the assumed tolerances.
-//! Without a drop, the law's own rupture position is used at the cost of the drop that should have been
-//! visible.
+//! A layer is expected to rupture at its puncture force or at its far interface, within the assumed tolerances. A layer without a drop
+//! ruptures at its expected position, at a cost that grows with the size of the missing drop.
 
 use crate::block_averages::BlockAverages;
 use crate::force_drops::ForceDrop;
 use crate::model::{Model, NO_RUPTURE};
 
-/// Cost of an unassigned drop as a share of its nats, up to [`MAX_PENALTY_NATS`].
+/// Cost of an unassigned drop as a share of its significance (half its squared score, nats), up to [`MAX_PENALTY_NATS`].
 const UNASSIGNED_SHARE: f64 = 0.15;
-/// Largest cost in nats of a drop without a layer, or of a layer without a drop.
+/// Largest cost (nats) of a drop without a layer, or of a layer without a drop.
 const MAX_PENALTY_NATS: f64 = 12.0;
-/// Standard deviation of the logarithm of a drop's size.
+/// Standard deviation of the logarithm of a drop's size about the expected elastic force.
 const LN_SIZE_SD: f64 = 0.6;
-/// A layer passed by this many standard deviations must have ruptured.
+/// A layer that is passed by more than this many standard deviations without a rupture is penalised.
 const PASSED_SD: f64 = 2.5;
 
-/// Recordings agree on a rupture position within this distance (m).
+/// Distance (m) within which recordings agree on a rupture position.
 const AGREEMENT_M: f64 = 1e-3;
-/// No layer ruptures where the needle is further back than it has been by this distance (m).
+/// Drops further behind the deepest position so far than this distance (m) are not assigned.
 const RETRACED_M: f64 = 1e-3;
-/// Expected rupture of a layer.
+/// Expected rupture of a layer: position of its front and of the rupture, standard deviation, stiffness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct ExpectedRupture {
     front_m: f64,
@@ -30,7 +29,7 @@ struct ExpectedRupture {
     stiffness_n_per_m: f64,
 }
 
-/// Expected ruptures; `trust` scales the assumed tolerances.
+/// Expected ruptures of all layers; `trust` scales the assumed tolerances.
 fn expected_ruptures(model: &Model, trust: f64) -> Vec<ExpectedRupture> {
     let b = &model.assumed;
     let mut front = model.tissue.surface_m;
@@ -45,7 +44,7 @@ fn expected_ruptures(model: &Model, trust: f64) -> Vec<ExpectedRupture> {
         let (place_m, sd) = if front + stretch < by_face {
             (front + stretch, (variance + stretch_sd * stretch_sd).sqrt())
         } else if stretch.is_finite() {
-            // Either condition may come first.
+            // The puncture force may be reached before the interface.
             (by_face, libm::hypot(face_sd, 0.3 * stretch_sd))
         } else {
             (by_face, face_sd)
@@ -62,8 +61,8 @@ fn expected_ruptures(model: &Model, trust: f64) -> Vec<ExpectedRupture> {
     out
 }
 
-/// Rupture times (s) of all layers in several recordings. Where most recordings agree on a layer's rupture
-/// position, it ruptures there in the others too, with or without a visible drop.
+/// Rupture times (s) of all layers in all recordings. If most recordings agree on a layer's rupture position, that position becomes the
+/// expectation for all of them.
 #[must_use]
 pub fn assign_ruptures(
     model: &Model,
@@ -117,7 +116,7 @@ fn assign_one_recording(
     let new_ground =
         |d: &&ForceDrop| reached.get(b.block_at(d.time_s)).is_none_or(|r| d.position_m > r - RETRACED_M);
     let drops: Vec<ForceDrop> = drops.iter().filter(new_ground).copied().collect();
-    // Candidates per layer: time and cost; assigning a drop saves its cost as unassigned.
+    // Candidates per layer: time and cost (nats); an assigned drop saves its cost as unassigned.
     let spare = |d: &ForceDrop| (UNASSIGNED_SHARE * 0.5 * d.score * d.score).min(MAX_PENALTY_NATS);
     let candidates: Vec<Vec<(f64, f64)>> = layers
         .iter()

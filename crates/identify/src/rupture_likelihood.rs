@@ -1,21 +1,19 @@
-//! Likelihood of a rupture time from the law's own rupture condition.
+//! Likelihood of a rupture time under the rupture condition of the model.
 //!
-//! A layer ruptures when its elastic force reaches the puncture force `F (1 + s_F n)` or the tip reaches the
-//! far interface displaced by
-//! `s_z n'`, whichever comes first, with `n, n'` standard normal: two competing risks. The density of the rupture time `tau` is
-//! `phi(u_F) u_F' Q(u_z) + phi(u_z) u_z' Q(u_F)` with `u_F = (f_K(tau)/F - 1)/s_F`, `u_z = (z(tau) - far)/s_z` and the normal upper tail
-//! `Q`; unlike the maximum of both risks it is smooth. `s_F^2 = sigma_F^2 + (f_K' h/F)^2/12` and `s_z^2 = sigma_z^2 + (v h)^2/12`
-//! combine the scatter between recordings with the uniform timing error of a sampling interval `h`.
+//! A layer ruptures when its elastic force reaches the puncture force `F (1 + s_F n)` or the tip reaches the far interface displaced by
+//! `s_z n'`, whichever comes first, with `n, n'` standard normal: two competing risks. With the upper tail `Q` of the normal distribution,
+//! `u_F = (f_K(tau)/F - 1)/s_F` and `u_z = (z(tau) - far)/s_z`, the density of the rupture time `tau` is
+//! `phi(u_F) u_F' Q(u_z) + phi(u_z) u_z' Q(u_F)`. The standard deviations `s_F^2 = sigma_F^2 + (f_K' h/F)^2/12` and
+//! `s_z^2 = sigma_z^2 + (v h)^2/12` combine the scatter between recordings with the uniform timing error of a sampling interval `h`.
 
 use crate::model::Scatter;
 
 /// State of a layer in one recording, relative to its rupture conditions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RuptureEvent {
-    /// Elastic force over the puncture force, minus one, at the rupture time; minus infinity without a puncture
-    /// force.
+    /// Elastic force over puncture force minus one, at the rupture time; minus infinity without a puncture force.
     pub force_excess: f64,
-    /// Position beyond the far interface in m.
+    /// Tip position relative to the far interface in m.
     pub depth_excess_m: f64,
     /// Rate of `force_excess` in 1/s.
     pub force_excess_rate: f64,
@@ -47,21 +45,21 @@ impl RuptureEvent {
     }
 }
 
-/// Relative error of a force at rupture from rounding and interpolation of the motion.
+/// Relative error of the force at rupture from rounding and interpolation of the motion.
 const MIN_FORCE_SD: f64 = 1e-4;
-/// The same for a position, in m.
+/// Standard deviation (m) of the position at rupture from rounding and interpolation of the motion.
 const MIN_DEPTH_SD_M: f64 = 1.5e-6;
-/// Lowest velocity in m/s at which a rupture time determines a depth.
+/// Lower bound of the tip velocity (m/s) in the density; below it, a rupture time does not determine a depth.
 const MIN_RATE_MPS: f64 = 2e-5;
 
-/// Likelihood of one rupture, also as rows of a least-squares problem.
+/// Likelihood of one rupture, and the same as rows of a least-squares problem.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RuptureLikelihood {
-    /// Residuals: by force, by depth, not yet by depth, not yet by force.
+    /// Residuals: rupture by force, by depth; survival by depth, by force.
     pub rows: [f64; 4],
     /// Negative log likelihood in nats.
     pub nats: f64,
-    /// Square roots of the shares of force and depth.
+    /// Square roots of the probabilities that the rupture is by force and by depth.
     pub shares: [f64; 2],
 }
 
@@ -89,6 +87,7 @@ fn deviance_residual(nats: f64) -> f64 {
 /// Standard deviations of force (relative) and depth (m) at rupture.
 #[must_use]
 pub fn rupture_sds(event: &RuptureEvent, scatter: &Scatter) -> (f64, f64) {
+    /// Variance of a uniform distribution of unit width.
     const TWELFTH: f64 = 1.0 / 12.0;
     let force = event.force_excess_rate * event.sample_step_s;
     let place = event.depth_rate_mps * event.sample_step_s;
@@ -98,7 +97,7 @@ pub fn rupture_sds(event: &RuptureEvent, scatter: &Scatter) -> (f64, f64) {
     )
 }
 
-/// Evaluates the likelihood of a rupture, or of its absence.
+/// Evaluates the likelihood of a rupture, or of its absence until the end of the recording.
 #[must_use]
 pub fn evaluate_rupture(event: &RuptureEvent, scatter: &Scatter) -> RuptureLikelihood {
     let (s_f, s_z) = rupture_sds(event, scatter);
@@ -126,7 +125,7 @@ pub fn evaluate_rupture(event: &RuptureEvent, scatter: &Scatter) -> RuptureLikel
     RuptureLikelihood { rows: rows(u_f, u_z, shares, true), nats: -total, shares }
 }
 
-/// Residual rows of `event` with the risk shares and standard deviations of `at`: for derivatives.
+/// Residual rows of `event` with the risk shares and standard deviations of `at` held constant, for derivatives.
 #[must_use]
 pub fn rupture_rows_at(event: &RuptureEvent, scatter: &Scatter, at: &RuptureEvent) -> [f64; 4] {
     let (s_f, s_z) = rupture_sds(at, scatter);
@@ -158,7 +157,7 @@ fn rows(u_f: f64, u_z: f64, [w_f, w_z]: [f64; 2], has_force: bool) -> [f64; 4] {
     }
 }
 
-/// Most likely scatter of force and depth, by alternating grid searches.
+/// Scatter of force and depth with the highest posterior, by alternating grid searches.
 #[must_use]
 pub fn estimate_rupture_scatter(events: &[RuptureEvent], start: &Scatter) -> Scatter {
     let mut best = *start;
@@ -177,16 +176,17 @@ pub fn estimate_rupture_scatter(events: &[RuptureEvent], start: &Scatter) -> Sca
     best
 }
 
-/// Prior on the scatter: half a nat per factor e above the smallest.
+/// Prior on the scatter: about half a nat per factor e, above 5e-4 (force, relative) and 5e-6 m (depth).
 #[must_use]
 pub fn scatter_prior_nats(s: &Scatter) -> f64 {
     let of = |ratio: f64| 0.25 * libm::log(1.0 + ratio * ratio);
     of(s.rupture_force / 5e-4) + of(s.rupture_depth_m / 5e-6)
 }
 
-/// Trial scatters of the force (relative).
+/// Trial values of the relative scatter of the force at rupture; spaced by about a factor of two.
 pub const FORCE_SCATTER_GRID: [f64; 13] =
     [0.0, 5e-4, 1e-3, 2e-3, 4e-3, 7e-3, 0.012, 0.02, 0.033, 0.055, 0.09, 0.15, 0.3];
+/// Trial values of the scatter of the depth at rupture in m; spaced by about a factor of two.
 const DEPTH_SCATTER_GRID_M: [f64; 12] =
     [0.0, 5e-6, 1e-5, 2e-5, 4e-5, 8e-5, 1.6e-4, 3.2e-4, 6.4e-4, 1.3e-3, 2.5e-3, 5e-3];
 

@@ -1,4 +1,4 @@
-//! Score test: first-order gain of additional columns, projected onto the complement of all fitted parameters.
+//! Score test of additional columns: first-order gain in nats after projection onto the complement of all fitted parameters.
 
 use crate::fit::{Fit, JacobianColumn, Linearization};
 use crate::likelihood::FitData;
@@ -7,7 +7,7 @@ use crate::noise::HUBER_LOSS;
 use stylet_stats::linear_algebra::{CholeskyFactor, SymmetricMatrix};
 use stylet_tissue::{EffectInfo, FitScale};
 
-/// Linearization of a fit, ready to test columns.
+/// Linearization of a fit at which columns are tested.
 pub struct ScoreTest<'a> {
     /// The fit.
     pub fit: &'a Fit,
@@ -22,18 +22,18 @@ pub struct ScoreTest<'a> {
 /// Result of testing columns.
 #[derive(Clone, Debug, Default)]
 pub struct ScoreTestResult {
-    /// Gain in nats.
+    /// Predicted gain in nats.
     pub nats: f64,
     /// Coefficient of every column.
     pub coefficients: Vec<f64>,
-    /// Nats that the columns would contribute with unit coefficients, after projection.
+    /// Gain (nats) that unit coefficients would give if the columns were present, after projection.
     pub detectable_nats: f64,
     /// Share of the columns' squared norm that remains after projection.
     pub unexplained_share: f64,
 }
 
 impl<'a> ScoreTest<'a> {
-    /// Linearization around a fit.
+    /// Linearizes a fit.
     #[must_use]
     pub fn new(fit: &'a Fit, data: &'a FitData) -> Self {
         let linearization = Linearization::new(&fit.model, data, &fit.residuals);
@@ -42,7 +42,7 @@ impl<'a> ScoreTest<'a> {
         Self { fit, data, linearization, factor, half_neg_gradient: slope }
     }
 
-    /// Joint gain of columns.
+    /// Joint predicted gain of columns.
     #[must_use]
     pub fn gain(&self, columns: &[JacobianColumn]) -> ScoreTestResult {
         let recordings = self.data.recording_count();
@@ -76,14 +76,14 @@ impl<'a> ScoreTest<'a> {
         }
     }
 
-    /// Column of an effect with these values, added to the fitted model.
+    /// Column of an effect with these values: the change of the prediction when it is added to the fitted model.
     #[must_use]
     pub fn effect_column(&self, term: &EffectTerm) -> Option<JacobianColumn> {
         let model = self.fit.model.with_effect(term.clone());
         self.linearization.difference(&self.fit.model, self.data, &self.fit.residuals, &model)
     }
 
-    /// Column of a force given per block (N), one vector per recording.
+    /// Column of an additional force (N) per block, one vector per recording.
     #[must_use]
     pub fn force_column(&self, force: &[Vec<f64>]) -> JacobianColumn {
         let mut column = JacobianColumn::default();
@@ -99,7 +99,7 @@ impl<'a> ScoreTest<'a> {
     }
 }
 
-/// Effect values for these coefficients: strengths are scaled, shape parameters keep their values.
+/// Effect values for fitted coefficients: strengths are scaled and summed over the group, shape parameters keep their values.
 #[must_use]
 pub fn scale_strengths(info: &EffectInfo, group: &[&[f64]], coefficients: &[f64]) -> Vec<f64> {
     info.parameters
@@ -116,7 +116,7 @@ pub fn scale_strengths(info: &EffectInfo, group: &[&[f64]], coefficients: &[f64]
             let value = neutral + sum;
             let (from, to) = p.search;
             if scale == FitScale::Reciprocal {
-                // Not more compliant than a fit may go.
+                // Limits the compliance to the bounds of a fit.
                 1.0 / value.clamp(1e-12, 10.0 / from)
             } else {
                 value.clamp(p.low.max(from - (to - from)), p.high.min(to + 3.0 * (to - from)))

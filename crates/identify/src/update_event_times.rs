@@ -1,16 +1,16 @@
-//! Moves rupture times by direct search: a derivative sees only the block in which a time lies.
+//! Moves rupture times by direct search: a derivative covers only the block of the rupture.
 
 use crate::likelihood::{FitData, ReplayCache};
 use crate::model::{Model, NO_RUPTURE};
 use stylet_stats::parallel::*;
 
-/// Trial moves in blocks, in either direction.
+/// Trial moves (blocks), in either direction.
 const MOVES_BLOCKS: [f64; 6] = [0.5, 1.0, 2.0, 4.0, 9.0, 20.0];
-/// Smallest gain in nats for which a time is moved.
+/// Smallest gain (nats) for which a time is moved: above rounding errors.
 const MIN_GAIN_NATS: f64 = 1e-6;
 
-/// Moves every rupture time to the best of its neighbourhood, of the law's own rupture time and of the given
-/// force drops (s, per recording). Returns true when one moved.
+/// Moves every rupture time to the best of trial moves, the model's own rupture time and the given force drops (s, per recording). Returns
+/// whether any time moved.
 pub fn update_event_times(model: &mut Model, data: &FitData, drops: &[Vec<f64>]) -> bool {
     let fixed = model.clone();
     let moved: Vec<(Vec<f64>, bool)> = (0..data.recording_count())
@@ -34,7 +34,7 @@ fn update_one_recording(model: &Model, data: &FitData, r: usize, drops: &[f64]) 
     let law_times = cache.free_rupture_times();
     let mut best = cache.nats_with_ruptures(model, data, r, &rupture_times);
     let mut moved = false;
-    // All rupture times of the law at once: an earlier one shifts the later ones.
+    // All rupture times of the model at once, because an earlier rupture shifts the later ones.
     if law_times.iter().zip(&rupture_times).any(|(a, b)| a != b) {
         let value = cache.nats_with_ruptures(model, data, r, &law_times);
         if value < best - MIN_GAIN_NATS {

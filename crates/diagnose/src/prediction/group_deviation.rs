@@ -1,36 +1,35 @@
-//! How a group of recordings may differ from that of the law: parameters and their spreads
-//! (`docs/reference/spreads.md`).
+//! Deviation of a group of recordings from the model: its parameters and prior standard deviations (`docs/reference/spreads.md`).
 
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use stylet_identify::model::{Assumptions, Model};
 use stylet_tissue::Effect;
 
-/// Number of parameters.
+/// Number of parameters of a deviation.
 pub const PARAMETERS: usize = 4;
 /// One value for each of `surface`, `force`, `friction` and `puncture`.
 pub type Values = [f64; PARAMETERS];
 
-/// A parameter in which a group may differ.
+/// A parameter of a group's deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Refit {
     /// Position of the surface.
     Surface,
-    /// One factor for all forces of the tissue.
+    /// Factor of all forces of the tissue.
     Force,
-    /// Friction: one factor for all layers, beyond that of all forces.
+    /// Factor of the friction of all layers, in addition to that of all forces.
     Friction,
-    /// Puncture force: one factor for all layers, beyond that of all forces.
+    /// Factor of the puncture force of all layers, in addition to that of all forces.
     Puncture,
 }
 
 impl Refit {
-    /// All, in the order of the deviations: surface, force, friction, puncture force.
+    /// All parameters, in the order of the deviations: surface, force, friction, puncture force.
     pub const ALL: [Self; PARAMETERS] = [Self::Surface, Self::Force, Self::Friction, Self::Puncture];
 }
 
-/// What changes from one group of recordings to another.
+/// What differs between groups of recordings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Factor {
@@ -43,7 +42,7 @@ pub enum Factor {
 }
 
 impl Factor {
-    /// All.
+    /// All factors.
     pub const ALL: [Self; 3] = [Self::Needle, Self::Tissue, Self::Setup];
 
     /// Standard deviations between groups: surface in m, the others of natural logarithms.
@@ -56,7 +55,7 @@ impl Factor {
         }
     }
 
-    /// Its name.
+    /// Name of the factor.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -67,24 +66,24 @@ impl Factor {
     }
 }
 
-/// Spreads between needles: surface (m), logarithms of force, friction, puncture force.
+/// Standard deviations between needles: surface (m), logarithms of force, friction and puncture force.
 const NEEDLE_SD: Values = [0.5e-3, 0.2, 0.25, 0.25];
-/// Spreads between specimens or batches of tissue.
+/// Standard deviations between specimens or batches of tissue, as in [`NEEDLE_SD`].
 const TISSUE_SD: Values = [1.5e-3, 0.25, 0.2, 0.25];
-/// Spreads between days or set-ups.
+/// Standard deviations between days or set-ups, as in [`NEEDLE_SD`].
 const SETUP_SD: Values = [1e-3, 0.05, 0.1, 0.1];
-/// Spreads between recordings of one group, before any is known.
+/// Standard deviations between recordings of one group before any is known: surface (m), logarithms of force, friction and puncture force.
 pub const RECORDING_SD: Values = [0.2e-3, 0.03, 0.05, 0.1];
-/// Standard deviation of the exponent by which force depends on speed, for speeds that the law was not made with.
+/// Standard deviation of the exponent with which force depends on speed, for speeds without training recordings.
 pub const RATE_EXPONENT_SD: f64 = 0.1;
 
-/// Standard deviations of an unseen group in which `varying` differ.
+/// Standard deviations of an unseen group that differs in the factors `varying`.
 #[must_use]
 pub fn group_sd(varying: &[Factor]) -> Values {
     std::array::from_fn(|k| varying.iter().map(|f| f.sd()[k].powi(2)).sum::<f64>().sqrt())
 }
 
-/// The model of recording `r` in a group that deviates; the factor of all forces is not in it.
+/// Model of recording `r` in a group with this deviation; the factor of all forces is applied to the predicted force instead.
 #[must_use]
 pub fn deviating_model(model: &Model, r: usize, deviation: &Values) -> Model {
     let [surface_m, _, ln_friction, ln_puncture] = *deviation;

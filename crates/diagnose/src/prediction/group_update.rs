@@ -1,27 +1,26 @@
-//! Gaussian update of a group's deviation from the law.
+//! Gaussian update of a group's deviation from the model by its recordings.
 //!
-//! Recording `r` of a group deviates from the law by `u_r`, normal about the group's `u` with the spreads between
-//! recordings; `u` is normal about zero with those between groups. The force is linearised about the best `u_r` of each
-//! recording, and the update of `u` is then linear (Gelman and others, *Bayesian Data Analysis*, chapters 5 and 15). The
-//! group may also be that of the law, or differ in some parameters only: the mean is averaged over all subsets of parameters
-//! by their marginal likelihoods (Hoeting and others 1999), so that little evidence moves little. Before any recording, no
-//! deviation at all is as probable as all other subsets together.
+//! The deviation `u_r` of recording `r` is normal about the deviation `u` of its group, which is normal about zero. The force is linearised
+//! about the best `u_r` of each recording, so the update of `u` is linear (Gelman and others, *Bayesian Data Analysis*, chapters 5 and 15).
+//! A group may differ in some parameters only, or in none: the mean is averaged over all subsets of parameters by their marginal
+//! likelihoods (Hoeting and others 1999), which shrinks it if evidence is weak. The prior probability of no deviation equals that of all
+//! other subsets together.
 
 use super::group_deviation::{PARAMETERS, Values};
 use stylet_stats::linear_algebra::{CholeskyFactor, SymmetricMatrix};
 
-/// Iterations of the fit to one recording.
+/// Largest number of Gauss-Newton iterations per recording.
 const MAX_ITERATIONS: usize = 10;
-/// Smallest gain in nats of an iteration.
+/// Gain (nats) of an iteration below which the fit has converged.
 const MIN_GAIN_NATS: f64 = 1e-3;
-/// Steps of the numerical derivatives, in standard deviations of the prior: ruptures move by more than a sample.
+/// Finite difference in standard deviations of the prior; over it, ruptures move by more than a sample.
 const DERIVATIVE_STEP: f64 = 0.25;
-/// Halvings of a step that does not lower the objective.
+/// Largest number of halvings of a step that does not decrease the objective.
 const MAX_HALVINGS: usize = 6;
-/// Surface positions to start from, in standard deviations of the prior.
+/// Start values of the surface, in standard deviations of the prior.
 const SURFACE_STARTS: [f64; 9] = [0.0, -1.0, 1.0, -2.0, 2.0, -3.0, 3.0, -4.0, 4.0];
 
-/// What one recording says about its deviation.
+/// Estimated deviation of one recording.
 #[derive(Clone, Debug)]
 pub struct RecordingEstimate {
     /// Most probable deviation.
@@ -32,11 +31,11 @@ pub struct RecordingEstimate {
     prior_sd: Values,
 }
 
-/// A recording to be fitted.
+/// A recording to be fitted, per block.
 pub struct Observation<'a> {
     /// Measured force in N.
     pub force_n: &'a [f64],
-    /// Whether a block is compared.
+    /// Whether the block is compared.
     pub used: &'a [bool],
     /// Weight of a squared error, in 1/N²: independent samples per block over the variance.
     pub weight: f64,
@@ -55,7 +54,7 @@ impl Observation<'_> {
     }
 }
 
-/// Fits the deviation of one recording; `force` predicts its blocks.
+/// Fits the deviation of one recording; `force` predicts its blocks (N) for a deviation.
 pub fn estimate_recording(
     observed: &Observation,
     force: impl Fn(&Values) -> Option<Vec<f64>>,
@@ -149,7 +148,7 @@ fn product(matrix: &SymmetricMatrix, by: &Values) -> Values {
 pub struct GroupEstimate {
     /// Mean over the subsets of parameters.
     pub mean: Values,
-    /// Mean when all parameters deviate.
+    /// Mean if all parameters deviate.
     pub full_mean: Values,
     /// Probability that each parameter deviates.
     pub probability: Values,
@@ -159,11 +158,11 @@ pub struct GroupEstimate {
     precision: CholeskyFactor,
 }
 
-/// Posterior of the deviation when the parameters with a standard deviation of zero are those of the law.
+/// Posterior of the deviation if only parameters with a positive standard deviation deviate.
 struct Subset {
     mean: Values,
     precision: CholeskyFactor,
-    /// Logarithm of the marginal likelihood over that without any deviation.
+    /// Log marginal likelihood relative to no deviation.
     ln_evidence: f64,
 }
 
@@ -182,7 +181,7 @@ impl Subset {
 }
 
 impl GroupEstimate {
-    /// The group before any recording of it, or after some.
+    /// Estimate from recordings of the group, which may be none.
     #[must_use]
     pub fn new(recordings: &[&RecordingEstimate], group_sd: Values, recording_sd: Values) -> Self {
         let mut information = SymmetricMatrix::zeros(PARAMETERS);
@@ -246,14 +245,14 @@ impl GroupEstimate {
         self.prior_sd[parameter] > 0.0
     }
 
-    /// Standard deviations when all parameters may deviate.
+    /// Standard deviations if all parameters may deviate.
     #[must_use]
     pub fn sd(&self) -> Values {
         let variance = self.precision.inverse_diagonal();
         std::array::from_fn(|k| self.prior_sd[k] * variance[k].max(0.0).sqrt())
     }
 
-    /// A drawn difference from the mean, from independent standard normal values.
+    /// Difference from the mean for independent standard normal values.
     #[must_use]
     pub fn draw(&self, independent: &Values) -> Values {
         let off = self.precision.back_substitute(independent);

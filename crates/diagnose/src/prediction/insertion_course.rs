@@ -1,7 +1,7 @@
-//! Course of an insertion: advance by depth, hold by time, retraction by depth.
+//! Phase coordinate of an insertion: advance by depth, hold by time, retraction by depth.
 //!
-//! Curves of recordings with other speeds and holds are averaged and compared at the same place of the course. A place is
-//! an index into [`BINS`] bins, with fractions between their centres.
+//! It aligns curves of recordings with different speeds and holds for averaging and comparison. A place is an index into [`BINS`] bins,
+//! with fractions between their centres.
 
 use serde::{Deserialize, Serialize};
 use stylet_identify::block_averages::BlockAverages;
@@ -9,18 +9,18 @@ use stylet_identify::insertion_phases::detect_phases;
 use stylet_record::Recording;
 use stylet_stats::median_of;
 
-/// Bins of the advance, and of the retraction.
+/// Number of bins of the advance, and of the retraction: 0.25 mm of a stroke of 25 mm.
 const DEPTH_BINS: usize = 100;
-/// Bins of the hold.
+/// Number of bins of the hold.
 const HOLD_BINS: usize = 25;
-/// Bins of a course.
+/// Number of bins of a course.
 pub const BINS: usize = 2 * DEPTH_BINS + HOLD_BINS;
-/// First bins of advance, hold and retraction, and the end.
+/// First bins of advance, hold and retraction, and the end of the course.
 const SEGMENTS: [usize; 4] = [0, DEPTH_BINS, DEPTH_BINS + HOLD_BINS, BINS];
 /// Half width (bins) of the window in which neighbouring bins are pooled: 1 mm of a stroke of 25 mm.
 const POOLED_BINS: usize = 4;
 
-/// Depths between which the bins of advance and retraction lie.
+/// Positions between which the bins of advance and retraction lie.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DepthRange {
     /// Lowest position in m.
@@ -29,15 +29,15 @@ pub struct DepthRange {
     pub deepest_m: f64,
 }
 
-/// A curve over the course; `None` in phases without samples.
+/// A curve over the bins; `None` in phases without samples.
 pub type Curve = Vec<Option<f64>>;
 
-/// The motion of one recording.
+/// Phases and speed of one recording.
 #[derive(Clone, Debug)]
 pub struct InsertionCourse {
     /// Median speed of the advance in m/s.
     pub speed_mps: f64,
-    /// Depths that it covers.
+    /// Range of positions.
     pub range: DepthRange,
     /// End of the advance in s.
     deepest_s: f64,
@@ -62,7 +62,7 @@ impl InsertionCourse {
         }
     }
 
-    /// Place of every block, with the tissue moved by `shift_m` along the axis.
+    /// Place of every block, with the tissue shifted by `shift_m` along the axis.
     #[must_use]
     pub fn places(&self, blocks: &BlockAverages, range: DepthRange, shift_m: f64) -> Vec<f64> {
         let length_m = (range.deepest_m - range.start_m).max(1e-9);
@@ -111,7 +111,7 @@ pub fn curve_of(places: &[f64], used: &[bool], values: &[f64]) -> Curve {
     out
 }
 
-/// A curve at a place.
+/// Value of a curve at a place, interpolated linearly.
 #[must_use]
 pub fn value_at(curve: &[Option<f64>], place: f64) -> Option<f64> {
     let low = place.floor() as usize;
@@ -121,7 +121,7 @@ pub fn value_at(curve: &[Option<f64>], place: f64) -> Option<f64> {
     Some(first + share * (second - first))
 }
 
-/// Mean curve of some curves, where all of them have a value.
+/// Mean of curves, where all of them have a value.
 #[must_use]
 pub fn mean_curve(curves: &[&Curve]) -> Curve {
     let n = curves.len().max(1) as f64;
@@ -132,7 +132,7 @@ pub fn mean_curve(curves: &[&Curve]) -> Curve {
     (0..BINS).map(mean).collect()
 }
 
-/// Means of a curve over neighbouring bins of the same phase.
+/// Means over neighbouring bins of the same phase.
 #[must_use]
 pub fn pooled(curve: &[Option<f64>]) -> Curve {
     let mut out = vec![None; BINS];

@@ -1,15 +1,15 @@
-//! Prediction of recordings that were not used for the model: another day, another needle.
+//! Predicts recordings that were not used for the model, for example of another day or needle.
 //!
-//! The model computes its ruptures from its own puncture forces (free run). Where the recordings that made it are known, the
-//! mean of their residuals is added, and the band contains the law's misfit.
+//! Ruptures follow from the model's own puncture forces (free run). If the training recordings are known, the mean of their
+//! residuals is added, and the prediction band contains the model discrepancy.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `insertion_course` | curves over advance, hold and retraction |
-//! | `training_curves`, `training_summary` | what the recordings that made a law show about it |
-//! | `group_deviation` | how another group of recordings may differ, with spreads |
+//! | `insertion_course` | phase coordinate over advance, hold and retraction |
+//! | `training_curves`, `training_summary` | curves, discrepancy and scatter of the training recordings |
+//! | `group_deviation` | deviation of another group of recordings, with its prior |
 //! | `group_update` | Gaussian update of a group's deviation |
-//! | `refit` | when a group's deviation is used |
+//! | `refit` | fit of a group's deviation, and whether it is used |
 //! | `uncertainty`, `prediction_band` | draws of the next recording, and their band |
 //! | `prepared`, `target`, `predicted_recording` | prediction of one recording |
 
@@ -42,37 +42,36 @@ use stylet_stats::parallel::*;
 use target::Target;
 pub use training_curves::{TrainingRun, TrainingSummary};
 
-/// What is known about the recordings to predict.
+/// Options of a prediction.
 #[derive(Clone, Debug, Default)]
 pub struct PredictionOptions {
     /// Parameters that are fitted to recordings of the new group.
     pub refit: Vec<Refit>,
-    /// Recordings of the new group to fit them to; without any, each recording is predicted from the others.
+    /// Recordings of the new group for that fit; without any, each recording is predicted from the others.
     pub refit_on: Vec<NamedRecording>,
-    /// What differs from the recordings that made the law, from nothing (the same group) to everything. `None`: nothing for
-    /// those recordings themselves, everything for all others.
+    /// Factors that differ from the training recordings. `None`: no factor for the training recordings themselves, all for others.
     pub varying: Option<Vec<Factor>>,
 }
 
-/// Shares of the measured force in the two bands, 0 to 1.
+/// Coverage of the two bands: share of the measured force inside, 0 to 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CoverageByGroup {
-    /// In the band of a new recording of the law's own group.
+    /// In the band of a new recording of the training group.
     pub same: f64,
-    /// In that of an unseen group.
+    /// In the band of an unseen group.
     pub unseen: f64,
 }
 
-/// A prediction without a model, from the recordings that made the law.
+/// A model-free prediction from the training recordings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Baseline {
-    /// `mean_curve` (of the recordings at this speed) or `stretched_mean` (of those at other speeds, by depth and hold).
+    /// `mean_curve` (training recordings at this speed) or `stretched_mean` (those at other speeds, aligned by depth and hold).
     pub name: String,
     /// Its RMS error in N.
     pub rmse_n: f64,
     /// RMS error of the prediction on the same recordings, in N.
     pub prediction_rmse_n: f64,
-    /// Whether the prediction is worse.
+    /// Whether the model predicts worse than this baseline.
     pub prediction_is_worse: bool,
 }
 
@@ -85,19 +84,19 @@ pub struct Prediction {
     pub rmse_n: f64,
     /// RMS error of the assumed scenario in N.
     pub assumed_rmse_n: Option<f64>,
-    /// Standard deviation of the sensor noise in N: lower limit of the error.
+    /// Standard deviation of the sensor noise in N, the lower limit of the error.
     pub floor_n: f64,
     /// Share of the measured force inside the 90 % band, 0 to 1.
     pub band_coverage: f64,
-    /// What the band assumes to differ from the recordings that made the law; empty for their own group.
+    /// Factors in which the band assumes a difference from the training recordings; empty for their own group.
     pub varying: Vec<Factor>,
-    /// Coverage of both bands; without a refit.
+    /// Coverage of both bands; `None` with a refit.
     pub coverage_by_group: Option<CoverageByGroup>,
-    /// Components of the band: noise, scatter between recordings, parameter intervals.
+    /// Components of the band, such as noise, scatter between recordings, parameter intervals.
     pub band_includes: Vec<String>,
-    /// The refit.
+    /// Result of the refit, if any.
     pub refit: Option<RefitReport>,
-    /// Whether no parameter was fitted to the recording that it predicts.
+    /// Whether every prediction is of a recording that its parameters were not fitted to.
     pub held_out: bool,
     /// Predictions without a model.
     pub baselines: Vec<Baseline>,
@@ -112,7 +111,7 @@ pub struct PredictionResult {
     pub curves: Vec<PredictionCurves>,
 }
 
-/// Summary of the recordings that made a law, for `diagnosis.json`; `None` when the law cannot be evaluated on them.
+/// Summary of the training recordings for `diagnosis.json`; `None` when the model cannot be evaluated on them.
 #[must_use]
 pub fn training_summary(
     scenario: &Scenario,
@@ -125,11 +124,10 @@ pub fn training_summary(
     training_summary::summarise(&Prepared::new(scenario, Some(diagnosis), recordings))
 }
 
-/// Predicts recordings with a scenario. `diagnosis` is the one that the scenario came from, if any: it gives noise, scatter,
-/// intervals and the curves of its recordings. `assumed` is the scenario before the diagnosis.
+/// Predicts recordings with a scenario. `diagnosis`, if any, is the one that produced the scenario: it gives noise, scatter, intervals and
+/// the curves of its recordings. `assumed` is the scenario before the diagnosis.
 ///
 /// # Errors
-///
 /// [`DiagnoseError`] when the recordings do not fit the scenario.
 pub fn predict(
     scenario: &Scenario,
@@ -200,7 +198,7 @@ pub fn predict(
     Ok(PredictionResult { prediction, curves })
 }
 
-/// Errors of the baselines over the recordings that have them.
+/// Errors of the baselines, over the recordings that have them.
 fn baselines(sums: &[ErrorSums]) -> Vec<Baseline> {
     let one = |name: &str, square: &dyn Fn(&ErrorSums) -> Option<f64>| {
         let known: Vec<(&ErrorSums, f64)> = sums.iter().filter_map(|s| Some((s, square(s)?))).collect();

@@ -25,7 +25,7 @@ pub struct RecordingPrediction {
     pub band_coverage: f64,
     /// Largest measured minus largest predicted force, in N.
     pub peak_error_n: f64,
-    /// Whether it is one of the recordings that made the law.
+    /// Whether it is a training recording.
     pub made_the_law: bool,
     /// Surface relative to the model's in m, if it was refitted.
     pub surface_shift_m: Option<f64>,
@@ -54,7 +54,7 @@ pub struct PredictionCurves {
     pub low_n: Vec<f64>,
     /// Upper edge in N.
     pub high_n: Vec<f64>,
-    /// Edges (N) of the other band: that of an unseen group for recordings of the same group, and the other way round.
+    /// Edges (N) of the other band: of an unseen group if the band is that of the training group, and the reverse.
     pub other_band_n: Option<(Vec<f64>, Vec<f64>)>,
     /// Whether the band is that of an unseen group.
     pub is_unseen_group: bool,
@@ -78,7 +78,7 @@ pub struct ErrorSums {
 }
 
 impl ErrorSums {
-    /// The sums of both, without the baselines.
+    /// Sum of both, without the baselines.
     pub fn plus(&self, other: &Self) -> Self {
         Self {
             blocks: self.blocks + other.blocks,
@@ -93,7 +93,7 @@ impl ErrorSums {
     }
 }
 
-/// Predicts one recording; `group` is its refitted group.
+/// Predicts one recording; `group` is its refitted group, if any.
 pub fn predict_one(
     prepared: &Prepared,
     training: Option<&TrainingSummary>,

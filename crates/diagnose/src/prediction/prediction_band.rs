@@ -13,25 +13,25 @@ use stylet_stats::order_statistics::quantile_of_sorted;
 
 /// Nominal coverage of the band.
 pub const BAND_LEVEL: f64 = 0.9;
-/// Equally likely noise values per draw.
+/// Number of equally likely noise values per draw, which smooth its quantiles.
 const NOISE_VALUES: usize = 9;
 /// Prediction band of one recording.
 pub struct Band<'a> {
     /// Model and recordings.
     pub prepared: &'a Prepared,
-    /// What the recordings that made the law show.
+    /// Summary of the training recordings.
     pub training: Option<&'a TrainingSummary>,
     /// The recording.
     pub recording: usize,
-    /// Mean residual of the law (N).
+    /// Mean residual (N) of the training recordings.
     pub mean_residual: &'a Curve,
     /// Place of every block in the course.
     pub places: &'a [f64],
 }
 
 impl Band<'_> {
-    /// Lower and upper edge (N) per block in a group of recordings about `deviation`. In another group than the law's own
-    /// (`is_unseen`) the mean residual may be missing, and counts as misfit, beside `extra_misfit_n`.
+    /// Lower and upper edge (N) per block for a group with deviation `deviation`. In an unseen group (`is_unseen`), the mean residual may
+    /// not recur and counts as discrepancy; so does `extra_misfit_n`.
     pub fn edges(
         &self,
         group: &GroupEstimate,
@@ -52,7 +52,7 @@ impl Band<'_> {
         band_edges(&draws, |k| libm::hypot(self.misfit_sd_n(k, is_unseen), extra_misfit_n))
     }
 
-    /// Standard deviation (N) of noise and misfit in block `k`.
+    /// Standard deviation (N) of noise and discrepancy in block `k`.
     fn misfit_sd_n(&self, k: usize, is_unseen: bool) -> f64 {
         let noise_n = self.prepared.uncertainty.block_n;
         let Some((t, place)) = self.training.zip(self.places.get(k)) else { return noise_n };
@@ -62,7 +62,7 @@ impl Band<'_> {
     }
 }
 
-/// Lower and upper edge (N) per block of drawn forces with noise of standard deviation `sd_n`.
+/// Lower and upper edge (N) per block from drawn forces plus noise of standard deviation `sd_n`.
 pub fn band_edges(draws: &[Vec<f64>], sd_n: impl Fn(usize) -> f64) -> (Vec<f64>, Vec<f64>) {
     let blocks = draws.first().map_or(0, Vec::len);
     let (mut low, mut high) = (Vec::with_capacity(blocks), Vec::with_capacity(blocks));

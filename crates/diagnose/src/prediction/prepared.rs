@@ -1,4 +1,4 @@
-//! Recordings and a model, ready for predictions.
+//! Recordings and a model, prepared for predictions.
 
 use super::group_deviation::{Values, deviating_model};
 use super::insertion_course::{Curve, InsertionCourse, value_at};
@@ -30,7 +30,7 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Prepares recordings.
+    /// Cleans and averages the recordings, and sets up the model of the scenario.
     pub fn new(scenario: &Scenario, diagnosis: Option<&Diagnosis>, evidence: &[NamedRecording]) -> Self {
         let ready = clean_recordings(evidence);
         let blocks: Vec<BlockAverages> = ready
@@ -50,7 +50,7 @@ impl Prepared {
         }
     }
 
-    /// Free-run force (N) of the law per block.
+    /// Free-run force (N) of the model per block.
     pub fn free_run(&self, r: usize) -> Option<Vec<f64>> {
         free_run_force(&self.model, &self.data, r)
     }
@@ -60,20 +60,20 @@ impl Prepared {
         (b.samples_per_block as f64 * b.sample_step_s).max(1e-9)
     }
 
-    /// Weight of a squared error of recording `r` in 1/N²: the misfit is correlated, so that a block counts for less than
-    /// one independent sample.
+    /// Weight of a squared error of a block of recording `r`, in 1/N²; a block counts for less than one sample because the discrepancy is
+    /// correlated.
     pub fn weight(&self, training: Option<&TrainingSummary>, r: usize) -> f64 {
         let block_s = self.block_s(&self.data.recordings[r]);
         let correlation_s = training.map_or(0.0, |t| t.correlation_s);
         block_s / (block_s + 2.0 * correlation_s) / self.misfit_n(training).powi(2)
     }
 
-    /// RMS error (N) of the law in its own group; the noise, where the recordings that made it are not known.
+    /// RMS error (N) of the model on the training recordings; the noise if these are unknown.
     pub fn misfit_n(&self, training: Option<&TrainingSummary>) -> f64 {
         training.map_or(self.uncertainty.block_n, |t| t.residual_rms_n).max(1e-12)
     }
 
-    /// Force (N) per block of recording `r` in a group that deviates, with the mean residual of the law.
+    /// Force (N) per block of recording `r` for a deviation, with the mean residual.
     pub fn force(
         &self,
         training: Option<&TrainingSummary>,
@@ -98,7 +98,7 @@ impl Prepared {
         Some(force)
     }
 
-    /// Adds the mean residual, moved with the surface, and the factor of all forces.
+    /// Adds the mean residual, shifted with the surface, and applies the factor of all forces.
     pub fn add_mean_residual(
         &self,
         training: Option<&TrainingSummary>,

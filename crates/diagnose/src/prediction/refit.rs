@@ -1,4 +1,4 @@
-//! Refit of a group's deviation to recordings of it, and whether it is used.
+//! Fits a group's deviation to its recordings, and decides by prediction errors whether it is used.
 
 use super::group_deviation::{Factor, PARAMETERS, RECORDING_SD, Refit, Values, group_sd};
 use super::group_update::{GroupEstimate, Observation, RecordingEstimate, estimate_recording};
@@ -13,50 +13,50 @@ use stylet_stats::parallel::*;
 pub struct FittedParameter {
     /// The parameter.
     pub parameter: Refit,
-    /// Its deviation from the law: m for the surface, else the natural logarithm of the factor.
+    /// Deviation from the model: m for the surface, else the natural logarithm of the factor.
     pub value: f64,
     /// Standard deviation after the update.
     pub sd: f64,
     /// Standard deviation before it.
     pub prior_sd: f64,
-    /// Probability that the group differs from the law in this parameter.
+    /// Posterior probability that the group deviates in this parameter.
     pub probability: f64,
 }
 
 /// Result of a refit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RefitReport {
-    /// Whether the deviation is used; if not, the law's own values are.
+    /// Whether the deviation is used instead of the model's own values.
     pub moved: bool,
-    /// Number of recordings that it was fitted to.
+    /// Number of fitted recordings.
     pub recordings: usize,
-    /// Deviation of the group, from all these recordings.
+    /// Deviation of the group, estimated from all of them.
     pub parameters: Vec<FittedParameter>,
     /// RMS error (N) of these recordings without the refit.
     pub before_n: f64,
-    /// The same with it: each from the others, or from itself if it is alone.
+    /// The same with the refit: each predicted from the others, or from itself if it is the only one.
     pub after_n: f64,
 }
 
-/// A group's deviation in the prediction of one recording.
+/// Deviation of a group as used in the prediction of one recording.
 #[derive(Clone, Debug)]
 pub struct RefittedGroup {
     /// Deviation.
     pub deviation: Values,
     /// Its distribution.
     pub estimate: GroupEstimate,
-    /// Standard deviation (N) of the misfit in this group beyond that of the law in its own.
+    /// Standard deviation (N) of the discrepancy in this group in addition to that of the training recordings.
     pub extra_misfit_n: f64,
 }
 
-/// Which deviation of a group is used.
+/// Deviation that is used for a group.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Choice {
-    /// None: the law's own values.
+    /// No deviation.
     Law,
-    /// The mean over the subsets of parameters.
+    /// Mean over the subsets of parameters.
     Averaged,
-    /// The mean when all parameters deviate.
+    /// Mean if all parameters deviate.
     Full,
 }
 
@@ -70,7 +70,7 @@ impl Choice {
     }
 }
 
-/// A refit for all recordings.
+/// Refit of a group, for the prediction of each of its recordings.
 pub struct GroupRefit {
     /// Result.
     pub report: RefitReport,
@@ -79,7 +79,7 @@ pub struct GroupRefit {
     group_sd: Values,
     recording_sd: Values,
     choice: Choice,
-    /// RMS error (N) of the law in its own group.
+    /// RMS error (N) of the model on the training recordings.
     misfit_n: f64,
 }
 
@@ -100,7 +100,7 @@ impl GroupRefit {
             .fold([0.0; PARAMETERS], |a, b| std::array::from_fn(|k| f64::max(a[k], b[k])));
         let group_sd: Values = std::array::from_fn(|k| if is_free(k) { wide[k] } else { 0.0 });
         let recording_sd = training.map_or(RECORDING_SD, |t| t.recording_sd);
-        // A recording deviates from the law by its group's deviation and by its own.
+        // The deviation of a recording is that of its group plus its own.
         let prior_sd: Values = std::array::from_fn(|k| {
             if group_sd[k] > 0.0 { libm::hypot(group_sd[k], recording_sd[k]) } else { 0.0 }
         });
@@ -144,7 +144,7 @@ impl GroupRefit {
         };
         out.report.before_n = pooled(&|_| [0.0; PARAMETERS])?;
         out.report.after_n = out.report.before_n;
-        // One recording cannot show how far another one follows it.
+        // With one recording, the refit cannot be tested on another.
         let all = if fitted.len() > 1 { &[Choice::Averaged, Choice::Full][..] } else { &[Choice::Averaged] };
         for choice in all {
             let error_n = pooled(&|r| choice.deviation(&out.estimate_for(r)))?;
@@ -178,7 +178,7 @@ impl GroupRefit {
         self.estimate_without((self.fitted.len() > 1).then_some(r))
     }
 
-    /// The group in the prediction of recording `r`: fitted to the others, or to itself if it is alone.
+    /// Deviation for the prediction of recording `r`: fitted to the others, or to itself if it is the only one.
     pub fn group_for(&self, r: usize) -> RefittedGroup {
         let estimate = self.estimate_for(r);
         let beyond = (self.report.after_n.powi(2) - self.misfit_n.powi(2)).max(0.0);

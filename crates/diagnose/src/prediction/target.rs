@@ -1,4 +1,4 @@
-//! A recording to predict, compared with those that made the law.
+//! A recording to predict, matched with the training recordings.
 
 use super::group_deviation::{RATE_EXPONENT_SD, Values};
 use super::insertion_course::{Curve, curve_of};
@@ -9,18 +9,18 @@ use super::training_curves::{BaselineCurves, TrainingSummary};
 pub struct Target {
     /// Its index.
     pub r: usize,
-    /// Its index among the recordings that made the law.
+    /// Index among the training recordings, if it is one of them.
     pub training_index: Option<usize>,
-    /// Mean residual (N) of the others of these.
+    /// Mean residual (N) of the other training recordings.
     pub mean_residual: Curve,
     /// Place of every block.
     pub places: Vec<f64>,
-    /// Predictions without a model.
+    /// Model-free predictions.
     pub baselines: BaselineCurves,
 }
 
 impl Target {
-    /// Recording `r`.
+    /// Matches recording `r` with the training recordings.
     pub fn new(prepared: &Prepared, training: Option<&TrainingSummary>, r: usize) -> Self {
         let (b, course) = (&prepared.data.recordings[r], &prepared.courses[r]);
         let Some(t) = training else {
@@ -45,7 +45,7 @@ impl Target {
     }
 }
 
-/// Spreads between groups, widened for a speed that the law was not made with.
+/// Standard deviations between groups, widened for a speed without training recordings.
 pub fn with_unseen_speed(
     mut sd: Values,
     prepared: &Prepared,

@@ -1,17 +1,17 @@
-//! What the recordings that made a law show about it: their curves, the law's misfit, the spread between them.
+//! Curves of the training recordings, with model discrepancy and scatter between recordings.
 
 use super::group_deviation::Values;
 use super::insertion_course::{BINS, Curve, DepthRange, mean_curve, pooled};
 use serde::{Deserialize, Serialize};
 
-/// Recordings have one speed when it differs by at most this share.
+/// Largest relative difference of the speeds of comparable recordings.
 const SPEED_TOLERANCE: f64 = 0.1;
-/// Recordings have one stroke when it differs by at most this length (m).
+/// Largest difference (m) of the deepest positions of comparable recordings.
 const STROKE_TOLERANCE_M: f64 = 1e-3;
-/// Two recordings are the same when their curves differ by at most this share of the largest force.
+/// Largest difference of the curves of one and the same recording, as a share of the largest force.
 const SAME_RECORDING_SHARE: f64 = 1e-5;
 
-/// A recording that took part in making the law.
+/// A training recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrainingRun {
     /// Name.
@@ -33,34 +33,34 @@ impl TrainingRun {
     }
 }
 
-/// What the recordings that made a law show about it.
+/// Summary of the training recordings.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrainingSummary {
-    /// Depths of the curves.
+    /// Range of positions of the curves.
     pub range: DepthRange,
     /// The recordings.
     pub runs: Vec<TrainingRun>,
-    /// RMS error (N) of the law with the mean residual of the other recordings.
+    /// RMS error (N) of the model with the mean residual of the other recordings.
     pub residual_rms_n: f64,
-    /// Standard deviation (N) of the misfit that neither noise nor the scatter of parameters explains.
+    /// Standard deviation (N) of the discrepancy: error without noise and scatter of parameters.
     pub discrepancy_sd_n: Curve,
-    /// Correlation time of the misfit in s.
+    /// Correlation time of the error in s.
     pub correlation_s: f64,
     /// Standard deviations between recordings: surface (m), logarithms of force, friction, puncture force.
     pub recording_sd: Values,
 }
 
-/// Baselines without a model for one recording.
+/// Model-free predictions of one recording.
 #[derive(Clone, Debug, Default)]
 pub struct BaselineCurves {
-    /// Mean of the recordings at this speed.
+    /// Mean of the training recordings at this speed and stroke.
     pub mean: Option<Curve>,
-    /// Mean of those at other speeds.
+    /// Mean of the others.
     pub stretched: Option<Curve>,
 }
 
 impl TrainingSummary {
-    /// The training recording that has this curve.
+    /// Index of the training recording with this curve.
     pub fn index_of(&self, force_n: &Curve) -> Option<usize> {
         let largest_n = force_n.iter().flatten().fold(0.0_f64, |m, f| m.max(f.abs()));
         self.runs.iter().position(|run| {
@@ -72,15 +72,14 @@ impl TrainingSummary {
         })
     }
 
-    /// Logarithm of a speed over the nearest one of the training recordings.
+    /// Absolute logarithm of the ratio of a speed to the nearest one of the training recordings.
     pub fn ln_speed_ratio(&self, speed_mps: f64) -> f64 {
         let ratios = self.runs.iter().map(|run| libm::log(speed_mps / run.speed_mps).abs());
         ratios.filter(|r| r.is_finite()).reduce(f64::min).unwrap_or(0.0)
     }
 
-    /// Mean residual of the recordings without the one at index `except`: of those at this speed and stroke, or else of all.
-    /// It is shrunk by the share of its square that its own scatter explains (James and Stein 1961), and zero for fewer
-    /// than two recordings.
+    /// Mean residual (N) of the training recordings except `except`: of those at this speed and stroke if there are two, else of all. It is
+    /// shrunk by the share of its square that its own scatter explains (James and Stein 1961), and zero for fewer than two recordings.
     pub fn mean_residual(&self, speed_mps: f64, stroke_m: f64, except: Option<usize>) -> Curve {
         let others = || self.runs.iter().enumerate().filter(move |(k, _)| Some(*k) != except);
         let like: Vec<&Curve> = others()
@@ -108,7 +107,7 @@ impl TrainingSummary {
         (0..BINS).map(shrunk).collect()
     }
 
-    /// Mean curves of the recordings without the one at index `except`.
+    /// Mean curves of the training recordings except `except`.
     pub fn baselines(&self, speed_mps: f64, stroke_m: f64, except: Option<usize>) -> BaselineCurves {
         let (mut like, mut other) = (Vec::new(), Vec::new());
         for (_, run) in self.runs.iter().enumerate().filter(|(k, _)| Some(*k) != except) {

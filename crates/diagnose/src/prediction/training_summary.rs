@@ -1,4 +1,4 @@
-//! Summary of the recordings that made a law: the law's misfit and the spread between them.
+//! Computes the summary of the training recordings: model discrepancy and scatter between recordings.
 
 use super::group_deviation::{PARAMETERS, RECORDING_SD, Values};
 use super::group_update::{Observation, estimate_recording};
@@ -8,27 +8,27 @@ use super::prepared::Prepared;
 use super::training_curves::{TrainingRun, TrainingSummary};
 use stylet_stats::parallel::*;
 
-/// Lag (s) at which the correlation of the misfit is measured: several blocks, and short compared with an insertion.
+/// Lag (s) at which the autocorrelation of the error is evaluated: several blocks, but short compared with an insertion.
 const CORRELATION_LAG_S: f64 = 0.2;
-/// Bounds of the correlation at that lag: times below 0.04 s and above 20 s are not distinguished.
+/// Bounds of the autocorrelation at that lag, which limit the correlation time to 0.04 s and 20 s.
 const CORRELATION_BOUNDS: (f64, f64) = (0.01, 0.99);
-/// Recordings that the documented spread between recordings counts for.
+/// Weight of the documented standard deviations between recordings, in recordings.
 const PRIOR_RECORDINGS: f64 = 2.0;
-/// Factors of the misfit's standard deviation, of which the first is used whose band holds nine tenths of the samples.
+/// Trial factors of the discrepancy's standard deviation; the first whose band contains [`BAND_LEVEL`] of the samples is used.
 const MISFIT_SCALES: [f64; 9] = [0.6, 0.7, 0.8, 0.9, 1.0, 1.2, 1.4, 1.7, 2.0];
-/// Decimal places (N) of the stored curves: 1 µN.
+/// Reciprocal resolution (1/N) of the stored curves: 1 µN.
 const STORED_DECIMALS: f64 = 1e6;
 
 fn stored(curve: Curve) -> Curve {
     curve.into_iter().map(|x| x.map(|x| (x * STORED_DECIMALS).round() / STORED_DECIMALS)).collect()
 }
 
-/// Sum over the compared blocks of the product with the block `lag` later.
+/// Sum of the products of compared blocks with those `lag` blocks before.
 fn lagged_sum(e: &[f64], used: &[bool], lag: usize) -> f64 {
     (lag..e.len()).filter(|k| used[*k] && used[k - lag]).map(|k| e[k] * e[k - lag]).sum()
 }
 
-/// Summary of the recordings that made a law; `None` when the law cannot be evaluated on them.
+/// Summary of the training recordings; `None` when the model cannot be evaluated on them.
 pub(super) fn summarise(prepared: &Prepared) -> Option<TrainingSummary> {
     let Prepared { data, courses, names, uncertainty, .. } = prepared;
     let n = names.len();
@@ -67,7 +67,7 @@ pub(super) fn summarise(prepared: &Prepared) -> Option<TrainingSummary> {
         .enumerate()
         .map(|(r, run)| out.mean_residual(run.speed_mps, run.stroke_m, Some(r)))
         .collect();
-    // What remains of each recording with the mean residual of the others.
+    // Residuals of each recording after subtraction of the mean residual of the others.
     let left: Vec<Vec<f64>> = (0..n)
         .map(|r| {
             let mean = |place: &f64| value_at(&mean_residuals[r], *place).unwrap_or(0.0);
@@ -90,7 +90,7 @@ pub(super) fn summarise(prepared: &Prepared) -> Option<TrainingSummary> {
         Some((t.as_ref()? - x.as_ref()? - uncertainty.block_n.powi(2)).max(0.0).sqrt())
     };
     let discrepancy: Curve = total.iter().zip(&explained).map(beyond).collect();
-    // Misfits are not normal: of few recordings one may differ from all others.
+    // The standard deviation is scaled to the nominal coverage, because discrepancies are not normal.
     let coverage = |scale: f64| {
         let each = (0..n).into_par_iter().map(|r| {
             let b = &data.recordings[r];
@@ -98,7 +98,7 @@ pub(super) fn summarise(prepared: &Prepared) -> Option<TrainingSummary> {
                 libm::hypot(uncertainty.block_n, scale * value_at(&discrepancy, places[r][k]).unwrap_or(0.0))
             };
             let (low, high) = band_edges(&draws[r], sd_n);
-            // The band lies about the law; the mean residual moves both.
+            // The mean residual would shift band and force by the same amount, so it is omitted from both.
             let inside = |k: &usize| (low[*k]..=high[*k]).contains(&(forces[r][*k] + left[r][*k]));
             let used: Vec<usize> = (0..b.len()).filter(|k| b.used[*k] && *k < low.len()).collect();
             (used.iter().filter(|k| inside(k)).count() as f64, used.len() as f64)
@@ -123,7 +123,7 @@ pub(super) fn summarise(prepared: &Prepared) -> Option<TrainingSummary> {
     Some(out)
 }
 
-/// Mean of the curves that have a value.
+/// Mean per bin over the curves with a value there.
 fn mean_of_known(curves: &[Curve]) -> Curve {
     (0..BINS)
         .map(|k| {
@@ -133,7 +133,7 @@ fn mean_of_known(curves: &[Curve]) -> Curve {
         .collect()
 }
 
-/// Spreads of the training recordings about the law, with the documented ones as prior.
+/// Standard deviations of the training recordings about the model, with the documented ones as prior.
 fn recording_sd(prepared: &Prepared, so_far: &TrainingSummary, mean_residuals: &[Curve]) -> Option<Values> {
     let wide = super::group_deviation::group_sd(&super::group_deviation::Factor::ALL);
     let each: Vec<Values> = (0..prepared.names.len())

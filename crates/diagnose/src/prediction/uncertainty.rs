@@ -1,4 +1,4 @@
-//! Uncertainty of a law's parameters, and draws of the next recording.
+//! Uncertainty of the model parameters, and draws of the next recording.
 
 use super::group_deviation::Factor;
 use super::training_curves::TrainingSummary;
@@ -13,9 +13,9 @@ use stylet_identify::model::{Assumptions, Model};
 use stylet_stats::linear_algebra::{CholeskyFactor, SymmetricMatrix};
 use stylet_tissue::{AnyEffect, Effect};
 
-/// Draws of a band.
+/// Number of draws for a band: its 5 % quantile is then an average over several of them.
 pub const DRAWS: usize = 80;
-/// Seed: the same model and recordings give the same draws.
+/// Seed of the draws, constant so that equal inputs give equal bands.
 pub const SEED: u64 = 0x5379_6c65;
 
 /// Uncertainty of a prediction.
@@ -29,13 +29,13 @@ pub struct Uncertainty {
     differences: RandomEffectSd,
     /// Parameters of base law and causes.
     parameters: Vec<LabelledParameter>,
-    /// Cholesky factor of their covariance.
+    /// Cholesky factor of the covariance of the parameters.
     factor: CholeskyFactor,
-    /// Whether it comes from a diagnosis.
+    /// Whether a diagnosis gave the uncertainty.
     from_diagnosis: bool,
 }
 
-/// Parameters of a diagnosis with their covariance; without one, their intervals count as independent.
+/// Parameters of a diagnosis with their covariance; without a covariance, their intervals are taken as independent.
 fn parameters_of(d: &Diagnosis) -> (Vec<LabelledParameter>, SymmetricMatrix) {
     let is_square = d.covariance.len() == d.parameters.len()
         && d.covariance.iter().all(|row| row.len() == d.parameters.len());
@@ -62,7 +62,7 @@ fn parameters_of(d: &Diagnosis) -> (Vec<LabelledParameter>, SymmetricMatrix) {
 }
 
 impl Uncertainty {
-    /// Uncertainty from a diagnosis; without one only the noise of the recordings is known.
+    /// Uncertainty from a diagnosis; without one, only the noise of the recordings.
     pub fn new(diagnosis: Option<&Diagnosis>, blocks: &[BlockAverages]) -> Self {
         let count = blocks.len().max(1) as f64;
         let within = blocks.iter().map(|b| b.within_block_sd_n().powi(2)).sum::<f64>() / count;
@@ -80,7 +80,7 @@ impl Uncertainty {
             return known;
         };
         known.floor_n = d.noise.sd_n;
-        // Lower limit: independent noise averaged over a block.
+        // At least white noise averaged over a block.
         let square = known.floor_n.powi(2);
         known.block_n = (square - within).max(square / samples.max(1.0)).sqrt();
         known.differences = d.random_effect_sd;
@@ -89,7 +89,7 @@ impl Uncertainty {
         known
     }
 
-    /// Names of the components.
+    /// Names of the components of the uncertainty.
     pub fn components(&self, training: Option<&TrainingSummary>, varying: &[Factor]) -> Vec<String> {
         let mut out = vec!["sensor noise".to_owned()];
         if self.from_diagnosis {
@@ -113,13 +113,13 @@ impl Uncertainty {
         out
     }
 
-    /// Drawn forces (N) of recording `r` in the law's own group.
+    /// Drawn forces (N) of recording `r` in the training group.
     pub fn draws(&self, model: &Model, data: &FitData, r: usize) -> Vec<Vec<f64>> {
         let mut rng = ChaCha8Rng::seed_from_u64(SEED);
         (0..DRAWS).filter_map(|_| free_run_force(&self.draw(model, r, &mut rng), data, r)).collect()
     }
 
-    /// A draw of the next recording's model.
+    /// Draws the model of the next recording.
     pub fn draw(&self, model: &Model, r: usize, rng: &mut ChaCha8Rng) -> Model {
         let mut normal = || -> f64 { StandardNormal.sample(rng) };
         let mut out = model.clone();

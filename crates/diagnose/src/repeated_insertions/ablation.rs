@@ -1,4 +1,4 @@
-//! Ablation of a model: every term is tested by cross-validation and evidence, and removed if not needed.
+//! Ablation of a model: tests every term by cross-validation and evidence, and removes those that are not needed.
 
 use super::cross_validation::PredictionScore;
 use super::held_out_loss::{MIN_EFFECT_LOSS, exceeds_standard_error, is_significant, relative_losses};
@@ -15,14 +15,14 @@ use stylet_identify::rupture_likelihood::RuptureEvent;
 use stylet_stats::parallel::*;
 use stylet_tissue::AnyEffect;
 
-/// The same for a parameter group within an effect, which is never reported as a cause. One standard error
-/// suffices (Breiman et al. 1984: the simplest of about equal models).
+/// Relative held-out loss from which a parameter group within an effect is kept. It is smaller than [`MIN_EFFECT_LOSS`] because the group
+/// is never reported as a cause; one standard error suffices (Breiman et al. 1984: the simplest of about equal models).
 const MIN_SHAPE_LOSS: f64 = 0.01;
 
 /// A term of a model with its ablation result.
 #[derive(Clone, Debug)]
 pub struct ModelTerm {
-    /// Effect that the term is or belongs to.
+    /// Effect that the term is, or belongs to.
     pub effect: &'static str,
     /// Name in reports.
     pub name: String,
@@ -34,22 +34,21 @@ pub struct ModelTerm {
     pub held_out_speed_loss: Vec<f64>,
     /// Evidence (nats) for the term, penalised by BIC.
     pub gain_nats: f64,
-    /// Whether the term stays in the model.
+    /// Whether the term is kept in the model.
     pub kept: bool,
     /// Whether the term may be reported as a cause.
     pub significant: bool,
 }
 
 impl ModelTerm {
-    /// Whether this is an effect that improves prediction without significance: it stays in the model and
-    /// is not reported as a cause.
+    /// Whether this is an effect that improves prediction without significance: it is kept in the model but not reported as a cause.
     #[must_use]
     pub fn is_uncertain(&self) -> bool {
         self.kept && !self.significant && self.name == self.effect
     }
 }
 
-/// Terms to test for removal, each with the model without it; `events` are those of the fit.
+/// Candidate terms for removal, each with its name and the model without it; `events` are those of the fit.
 fn removal_candidates(model: &Model, events: &[Vec<RuptureEvent>]) -> Vec<(&'static str, String, Model)> {
     let mut out = Vec::new();
     let has_slip = model.effects.iter().any(|c| c.info.id == shaft_slip_info().id);
@@ -85,12 +84,11 @@ fn removal_candidates(model: &Model, events: &[Vec<RuptureEvent>]) -> Vec<(&'sta
     out
 }
 
-/// The model without effects of this id. Layers with a delayed puncture get their observed rupture force as
-/// puncture force.
+/// The model without the effects `id`. A layer that had a delayed puncture gets its observed rupture force as puncture force.
 pub(super) fn without_effect(model: &Model, events: &[Vec<RuptureEvent>], id: &str) -> Model {
     let mut out = model.clone();
     let mut tissue = out.assumed.tissue.clone();
-    // Random effects of parameters are numbered in the order of the effects.
+    // Random effects of parameters are indexed in the order of the effects.
     let stays: Vec<usize> = model
         .varying_parameters()
         .enumerate()
@@ -124,8 +122,7 @@ pub(super) fn without_effect(model: &Model, events: &[Vec<RuptureEvent>], id: &s
     out
 }
 
-/// The model with parameters of `shaft_slip` fixed at their inactive values; `None` if they are there
-/// already.
+/// The model with parameters of `shaft_slip` fixed at their inactive values; `None` if they already are.
 fn with_fixed_slip_parameters(model: &Model, numbers: &[(&str, f64)]) -> Option<Model> {
     let mut out = model.clone();
     let mut any = false;
@@ -154,8 +151,7 @@ struct AblationResult {
     loses: Vec<f64>,
     /// The same with whole speeds held out; empty for a single speed.
     speeds_lose: Vec<f64>,
-    /// Evidence (nats) at the noise of the whole model, minus the BIC penalty of half the logarithm of the
-    /// number of blocks per parameter (Schwarz 1978).
+    /// Evidence (nats) for the term: gain under the noise of the whole model minus the BIC penalty (Schwarz 1978).
     nats: f64,
 }
 
@@ -178,27 +174,27 @@ impl AblationResult {
         Self { loses: relative_losses(without, with), speeds_lose: Vec::new(), nats }
     }
 
-    /// Whether an effect is supported: significantly by held-out recordings, or by the evidence without a
-    /// contradiction from held-out recordings.
+    /// Whether an effect is supported: significantly by held-out recordings, or by the evidence if held-out recordings do not contradict
+    /// it.
     fn is_supported(&self) -> bool {
         let worse = |loses: &[f64]| !loses.is_empty() && stylet_stats::mean(loses) > 0.0;
         let uncontradicted = self.nats > 0.0 && (worse(&self.loses) || worse(&self.speeds_lose));
         uncontradicted || is_significant(&self.loses) || is_significant(&self.speeds_lose)
     }
 
-    /// Whether an effect stays in the model.
+    /// Whether an effect is kept.
     fn keeps_effect(&self) -> bool {
         self.is_supported() || exceeds_standard_error(&self.loses, MIN_EFFECT_LOSS)
     }
 
-    /// Whether a parameter group within an effect stays.
+    /// Whether a parameter group within an effect is kept.
     fn keeps_shape(&self) -> bool {
         exceeds_standard_error(&self.loses, MIN_SHAPE_LOSS)
             || exceeds_standard_error(&self.speeds_lose, MIN_SHAPE_LOSS)
     }
 }
 
-/// Tests every term of the model by ablation and removes those that are not needed.
+/// Tests every term of the model by ablation, in ascending order of its held-out loss, and removes those that are not needed.
 pub(super) fn ablate(best: &mut ScoredModel, recordings: &[&SegmentedRecording]) -> Vec<ModelTerm> {
     let at = with_coarse_blocks(&best.set_fit);
     let (whole, speeds) = (best.scores.clone(), cross_validate_speeds(&best.set_fit, recordings));
@@ -227,7 +223,7 @@ pub(super) fn ablate(best: &mut ScoredModel, recordings: &[&SegmentedRecording])
         let smaller = if gone.is_empty() {
             best.set_fit.refit_with(&less.fit.model)
         } else {
-            // Tested again without the terms removed before.
+            // Repeats the test without the terms that were already removed.
             let now = &best.set_fit.fit;
             let now =
                 removal_candidates(&now.model, &now.residuals.ruptures).into_iter().find(|c| c.1 == *name);

@@ -1,5 +1,4 @@
-//! Cross-validation of repeated recordings: one recording or one speed held out, scored by phase, and the
-//! repeatability floor.
+//! Cross-validation of repeated recordings, with one recording or one speed held out: scores by phase, and the repeatability floor.
 
 use super::empirical_discrepancy::estimate_discrepancy;
 use super::insertion_phase::{InsertionPhase, phase_at};
@@ -11,7 +10,7 @@ use stylet_identify::model::NO_RUPTURE;
 use stylet_stats::interpolate;
 use stylet_stats::parallel::*;
 
-/// Half width (s) of the window around a rupture.
+/// Half width (s) of the puncture window around a rupture.
 const RUPTURE_HALF_WINDOW_S: f64 = 0.5;
 /// Names of the entries of [`PredictionScore::phase_squares`].
 pub const PHASE_NAMES: [&str; 5] = ["loading", "puncture window", "cutting", "hold", "retraction"];
@@ -68,7 +67,7 @@ pub fn training_recordings<'a>(
     (0..recordings.len()).filter(|r| !out.contains(r)).map(|r| recordings[r]).collect()
 }
 
-/// Refits without some recordings; `rounds` are the iterations between noise updates.
+/// Refits without the recordings `out`; `rounds` are the numbers of iterations between noise updates.
 #[must_use]
 pub fn refit_without(all: &SetFit, out: &[usize], rounds: &[usize]) -> Option<SetFit> {
     let kept: Vec<usize> = (0..all.drop_times_s.len()).filter(|r| !out.contains(r)).collect();
@@ -78,7 +77,7 @@ pub fn refit_without(all: &SetFit, out: &[usize], rounds: &[usize]) -> Option<Se
     Some(SetFit { fit, data, drop_times_s: drops, starts: all.starts })
 }
 
-/// Population of a refit without some recordings.
+/// Population of a refit without the recordings `out`.
 #[must_use]
 pub fn population_without(
     all: &SetFit,
@@ -94,7 +93,7 @@ pub fn population_without(
 pub struct HeldOutPrediction {
     /// Score of the model with its empirical discrepancy.
     pub score: PredictionScore,
-    /// That prediction.
+    /// Prediction of the model with its empirical discrepancy.
     pub prediction: PredictedForce,
     /// Score of the model alone.
     pub model_score: PredictionScore,
@@ -110,13 +109,13 @@ pub fn leave_one_out_scores(all: &SetFit, recordings: &[&SegmentedRecording]) ->
     leave_one_out(all, recordings).into_iter().map(|o| o.model_score).collect()
 }
 
-/// Leave-one-out predictions, with and without the empirical discrepancy of the group.
+/// Leave-one-out predictions with and without the empirical discrepancy of the group.
 #[must_use]
 pub fn leave_one_out(all: &SetFit, recordings: &[&SegmentedRecording]) -> Vec<HeldOutPrediction> {
     let groups = group_by_speed_and_stroke(recordings);
     let one = |r: usize| {
         let day_of = &all.fit.model.day_of;
-        // The day is known if another recording was made on it.
+        // The random effect of the day is estimated if another recording was made on it.
         let day = day_of.get(r).copied().filter(|day| day_of.iter().filter(|d| *d == day).count() > 1);
         let population = population_without(all, recordings, &[r], &[5])?;
         let predict_one = |r: usize| predict_force(&population, recordings[r], day, DRAWS);
@@ -138,7 +137,7 @@ pub fn leave_one_out(all: &SetFit, recordings: &[&SegmentedRecording]) -> Vec<He
     (0..recordings.len()).into_par_iter().map(|r| one(r).unwrap_or_default()).collect()
 }
 
-/// Scores with the whole group (speed and stroke) held out; empty for a single group.
+/// Scores with the whole group of equal speed and stroke held out; empty for a single group.
 #[must_use]
 pub fn leave_speed_out(all: &SetFit, recordings: &[&SegmentedRecording]) -> Vec<PredictionScore> {
     let groups = group_by_speed_and_stroke(recordings);
@@ -166,8 +165,8 @@ pub fn leave_speed_out(all: &SetFit, recordings: &[&SegmentedRecording]) -> Vec<
     out
 }
 
-/// Repeatability floor: score of the mean of the other recordings of a group, aligned at the start of
-/// motion, and their number `n`. The scatter of that mean inflates the floor by `sqrt((n + 1)/n)`.
+/// Repeatability floor of each recording: score of the mean of the `n` other recordings of its group, aligned at the start of motion, and
+/// `n`. The scatter of that mean increases the floor by `sqrt((n + 1)/n)`.
 #[must_use]
 pub fn repeatability_floor(recordings: &[&SegmentedRecording]) -> Vec<Option<(PredictionScore, usize)>> {
     let groups = group_by_speed_and_stroke(recordings);

@@ -5,7 +5,7 @@ use crate::diagnosis_json::DataQualityNote;
 use std::collections::BTreeMap;
 use stylet_record::{DEFAULT_HALF_WIDTH_S, QualityKind, QualityNote, Recording};
 
-/// Data-quality notes: one per speed for what its recordings have in common, then those of every recording.
+/// Data-quality notes: one per speed for what its recordings share, then those of each recording.
 #[must_use]
 pub fn data_quality(recordings: &[&SegmentedRecording]) -> Vec<DataQualityNote> {
     let mut out = Vec::new();
@@ -49,7 +49,7 @@ pub fn data_quality(recordings: &[&SegmentedRecording]) -> Vec<DataQualityNote> 
     out
 }
 
-/// Timing and stroke of a recording in words, for the data-quality section.
+/// Sampling and stroke of a recording in words, for the data-quality section.
 #[must_use]
 pub fn sampling_summary(recording: &Recording) -> String {
     let n = recording.len();

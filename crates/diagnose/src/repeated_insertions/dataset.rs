@@ -10,8 +10,8 @@
 //!     load: (file: "needle_phantom/constant_5N.csv", force_n: 5.0),
 //! )
 //! ```
-//! File names are relative to the folder that the environment variable `STYLET_MEASURED` names; `*` in the last
-//! component matches any text. The format is described in `docs/reference/files.md`.
+//! File names are relative to the folder in the environment variable `STYLET_MEASURED`; `*` in the last component matches
+//! any text. The format is described in `docs/reference/files.md`.
 
 use super::segmented_recording::SegmentedRecording;
 use serde::Deserialize;
@@ -34,7 +34,7 @@ pub struct KnownLoad {
     pub force_n: f64,
 }
 
-/// Recordings of one layer alone.
+/// Recordings of one layer by itself.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SingleLayerPart {
@@ -63,7 +63,7 @@ pub struct Dataset {
     /// Files of repeated insertions.
     #[serde(default)]
     pub recordings: Vec<String>,
-    /// Columns whose values separate the specimens in one file; each specimen is a material of its own.
+    /// Columns whose values separate the specimens in one file. Every specimen is a separate material.
     #[serde(default)]
     pub split_by: Vec<String>,
     /// File of a motion in air.
@@ -75,12 +75,12 @@ pub struct Dataset {
     /// Recordings of single layers.
     #[serde(default)]
     pub parts: Vec<SingleLayerPart>,
-    /// Drop rows with backward or repeated time stamps and report them (set by the command line).
+    /// Whether to drop and report rows with decreasing or repeated time stamps; set by the command line.
     #[serde(skip)]
     pub repair: bool,
 }
 
-/// Why a data set cannot be used.
+/// Error of reading a data set.
 #[derive(Debug, thiserror::Error)]
 pub enum DatasetError {
     /// Invalid description.
@@ -99,7 +99,7 @@ pub enum DatasetError {
         /// Folder that was searched.
         folder: String,
     },
-    /// Not enough data or columns.
+    /// Too few data or missing columns.
     #[error("{0}")]
     TooLittle(String),
 }
@@ -132,10 +132,9 @@ impl Dataset {
         Self::parse(&path.display().to_string(), &read_text(path)?)
     }
 
-    /// Parses and validates a description; `file` is named in errors.
+    /// Parses and validates a description; `file` is its name in errors.
     ///
     /// # Errors
-    ///
     /// [`InputError`] with line and column.
     pub fn parse(file: &str, text: &str) -> Result<Self, InputError> {
         let out: Self = parse(file, text)?;
@@ -178,14 +177,12 @@ impl Dataset {
         ReadOptions { columns: self.columns.clone(), repair: self.repair }
     }
 
-    /// Reads recordings of a tissue with `layers` layers. Each is assessed by itself and against the others
-    /// ([`stylet_record::assess`], [`find_outlier_recordings`]).
+    /// Reads recordings of a tissue with `layers` layers, and assesses each by itself and against the others ([`stylet_record::assess`],
+    /// [`find_outlier_recordings`]).
     ///
     /// # Errors
-    ///
-    /// [`DatasetError`]; [`RecordError::Unusable`] names every unusable recording. Specimens in one file
-    /// ([`Dataset::split_by`]) share columns and sensor: those that are too short or never touched are left
-    /// to the analysis.
+    /// [`DatasetError`]; [`RecordError::Unusable`] names every unusable recording. Specimens in one file ([`Dataset::split_by`]) share
+    /// columns and sensor; those that are too short or without contact are excluded later by the analysis.
     pub fn load_recordings(
         &self,
         files: &[PathBuf],
@@ -271,11 +268,9 @@ fn read_text_of(file: &Path) -> Result<String, DatasetError> {
         .map_err(|source| RecordError::Unreadable { path: file.to_owned(), source }.into())
 }
 
-/// Files that match a pattern, sorted. Relative patterns start at the folder that the environment variable
-/// `STYLET_MEASURED` names.
+/// Files that match a pattern, sorted. Relative patterns start at the folder in the environment variable `STYLET_MEASURED`.
 ///
 /// # Errors
-///
 /// [`DatasetError::NoFile`].
 pub fn find_files(pattern: &str) -> Result<Vec<PathBuf>, DatasetError> {
     let folder = std::env::var_os("STYLET_MEASURED").map(PathBuf::from);
@@ -301,7 +296,7 @@ pub fn find_files(pattern: &str) -> Result<Vec<PathBuf>, DatasetError> {
     if out.is_empty() { Err(missing()) } else { Ok(out) }
 }
 
-/// Whether `name` matches `pattern`, in which `*` stands for any text.
+/// Whether `name` matches `pattern`, in which `*` matches any text.
 fn matches(pattern: &str, name: &str) -> bool {
     let mut parts = pattern.split('*');
     let first = parts.next().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Diagnosis of repeated recordings, with held-out errors.
+//! Diagnoses a set of repeated recordings, with held-out errors.
 
 use super::ablation::ModelTerm;
 use super::cross_validation::{HeldOutPrediction, leave_one_out, leave_speed_out, repeatability_floor};
@@ -28,11 +28,11 @@ use stylet_record::sensor_artefacts;
 use stylet_scenario::Scenario;
 use stylet_tissue::{DelayedPuncture, Effect, PowerLawFriction, RateDependentPuncture, Tissue};
 
-/// Seed of the start values.
+/// Seed of the random start values, constant so that equal recordings give equal results.
 const START_VALUE_SEED: u64 = 1;
-/// Verdict `unknown`: more than this share of the base law's excess over the floor is unexplained ...
+/// Verdict `unknown`: smallest unexplained share of the base law's mean square error above the floor.
 const MAX_UNEXPLAINED_SHARE: f64 = 0.1;
-/// ... and the held-out error exceeds the floor by this share.
+/// Verdict `unknown`: smallest excess of the held-out error over the floor, as a share of the floor; both are required.
 const MAX_EXCESS_OVER_FLOOR: f64 = 0.2;
 
 /// Result of the diagnosis of repeated recordings.
@@ -41,11 +41,11 @@ pub struct SetDiagnosis {
     pub candidates: CandidateModels,
     /// Leave-one-out predictions of the best model.
     pub held_out: Vec<HeldOutPrediction>,
-    /// Those of the base law.
+    /// Leave-one-out predictions of the base law.
     pub base_held_out: Vec<HeldOutPrediction>,
     /// Verdict, causes and evidence.
     pub diagnosis: Diagnosis,
-    /// Repeatability section.
+    /// Repeatability section of the report.
     pub report: RepeatabilityReport,
     /// The mean insertion as a scenario.
     pub mean_scenario: Scenario,
@@ -53,8 +53,7 @@ pub struct SetDiagnosis {
     pub recordings: Vec<SegmentedRecording>,
 }
 
-/// Diagnoses repeated recordings; instrument faults are corrected first. `None` when the base law cannot be
-/// fitted.
+/// Diagnoses repeated recordings after correction of instrument faults. `None` when the base law cannot be fitted.
 #[must_use]
 pub fn diagnose_set(
     name: &str,
@@ -101,7 +100,7 @@ pub fn diagnose_set(
 }
 
 impl SetDiagnosis {
-    /// Adds the nested cross-validation.
+    /// Runs the nested cross-validation and adds it to the report.
     pub fn run_nested_cross_validation(&mut self) {
         let recordings: Vec<&SegmentedRecording> = self.recordings.iter().collect();
         self.report.nested = nested_cross_validation(&self.candidates, &recordings);
@@ -251,14 +250,13 @@ fn diagnosis(
         advice: advice(best, &estimates),
         training: None,
     };
-    // The floor is what recordings predict of each other, so scatter between them is in it.
+    // The repeatability floor already contains the scatter between recordings.
     claims::apply(&mut diagnosis, &Context::default());
     diagnosis.grade = Some(grade(&diagnosis, 0.0));
     diagnosis
 }
 
-/// Effects that recordings at one speed cannot identify. A delayed puncture counts only where no puncture
-/// force is equivalent.
+/// Effects that recordings at a single speed do not identify.
 fn unidentified_effects(best: &ScoredModel, recordings: &[&SegmentedRecording]) -> Vec<String> {
     let all = [
         PowerLawFriction { exponent: 1.0 }.info().id,

@@ -1,18 +1,17 @@
 //! Empirical model discrepancy of repeated recordings at one speed and stroke.
 //!
-//! The residuals of the other recordings of a group have a mean and a scatter about it. The mean is added
-//! to the model's prediction, shrunk by the share of its square that its own scatter does not explain
-//! (model discrepancy, Kennedy and O'Hagan 2001; shrinkage, James and Stein 1961). For a perfect model the
-//! correction vanishes; for a poor one model plus correction tend to the mean of the other recordings. The
-//! correction is valid at its speed only and names no cause.
+//! The mean residual of the other recordings of the group is added to the model's prediction, shrunk by the share of its square that its
+//! own scatter explains (model discrepancy, Kennedy and O'Hagan 2001; shrinkage, James and Stein 1961). For a perfect model the correction
+//! vanishes; for a poor one, model plus correction approach the mean of the other recordings. The correction is valid only at its speed and
+//! is not a cause.
 
 use super::population_prediction::{PredictedForce, Z90};
 use super::segmented_recording::SegmentedRecording;
 use stylet_stats::interpolate;
 
-/// Half width (s) of the window that estimates the shrinkage: residuals stay correlated for about 1 s.
+/// Half width (s) of the window in which the shrinkage is estimated: residuals are correlated over about 1 s.
 const SHRINKAGE_HALF_WINDOW_S: f64 = 2.0;
-/// Padding (s) before the start and after the retraction in the piecewise time map.
+/// Padding (s) of the time map before the start and after the retraction, longer than any recording.
 const PADDING_S: f64 = 1e4;
 
 /// Mean residual of the other recordings of a group at every sample of a recording.
@@ -20,13 +19,13 @@ const PADDING_S: f64 = 1e4;
 pub struct EmpiricalDiscrepancy {
     /// Correction to the predicted force (N); zero where the mean is not significant.
     pub mean_n: Vec<f64>,
-    /// Scale factor of the prediction band: the corrected mean is no longer part of the scatter, but is
-    /// known only as well as the other recordings scatter.
+    /// Scale factor of the prediction band: the corrected mean no longer counts as scatter, but has the uncertainty of a mean over the
+    /// other recordings.
     pub band_scale: Vec<f64>,
 }
 
 impl EmpiricalDiscrepancy {
-    /// The prediction with this correction.
+    /// The corrected prediction.
     #[must_use]
     pub fn apply(&self, predicted: &PredictedForce) -> PredictedForce {
         let mut out = predicted.clone();
@@ -40,8 +39,7 @@ impl EmpiricalDiscrepancy {
     }
 }
 
-/// Times (s) of start, deepest point and begin of retraction, padded at both ends: knots of the map between
-/// recordings.
+/// Knots (s) of the piecewise linear time map between recordings: start, deepest point and begin of retraction, padded at both ends.
 fn time_knots(run: &SegmentedRecording) -> [f64; 5] {
     let time_s = &run.recording.time_s;
     let at = |i: usize| time_s.get(i).or(time_s.last()).copied().unwrap_or(0.0);
@@ -49,8 +47,8 @@ fn time_knots(run: &SegmentedRecording) -> [f64; 5] {
     [start - PADDING_S, start, deepest, back, back + PADDING_S]
 }
 
-/// Discrepancy of `run`, predicted as `predicted`, from the residuals of the `others` of its group; each
-/// comes with its mean predicted force (N).
+/// Discrepancy of `run` from the residuals of the `others` of its group, each with its mean predicted force (N); `predicted` is the
+/// prediction of `run`.
 #[must_use]
 pub fn estimate_discrepancy(
     run: &SegmentedRecording,
@@ -73,7 +71,7 @@ pub fn estimate_discrepancy(
         .collect();
     let time_s = &run.recording.time_s;
     let (mut mean, mut noise) = (Vec::with_capacity(time_s.len()), Vec::with_capacity(time_s.len()));
-    // The scatter that the model expects counts as one more recording.
+    // The scatter expected by the model counts as one more recording.
     let expected: Vec<f64> =
         predicted.low_n.iter().zip(&predicted.high_n).map(|(low, high)| (high - low) / (2.0 * Z90)).collect();
     for (i, t) in time_s.iter().enumerate() {
@@ -99,7 +97,7 @@ pub fn estimate_discrepancy(
         let (square, by_chance) = (squares[to] - squares[from], noises[to] - noises[from]);
         let share = if square > by_chance { 1.0 - by_chance / square } else { 0.0 };
         out.mean_n.push(share * mean[i]);
-        // A new recording scatters like the others, plus the error of their mean.
+        // Variance of a new recording: scatter of the others plus the error of their mean.
         let ratio = if expected[i] > 0.0 { (n + 1.0) * noise[i] / expected[i].powi(2) } else { 1.0 };
         out.band_scale.push((1.0 - share + share * ratio).sqrt());
     }

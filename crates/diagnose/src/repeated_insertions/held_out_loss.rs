@@ -1,13 +1,13 @@
-//! Tests on the held-out loss without a term of a model. Recordings are the independent units.
+//! Tests the held-out loss without a term of a model; recordings are the independent units.
 
 use super::cross_validation::{PHASE_NAMES, PredictionScore};
 use stylet_stats::student_t;
 
-/// An effect stays if the held-out error grows by this share without it, significantly, or if the evidence
-/// supports it. The threshold covers selection bias: models without the effect had fewer starts.
+/// Relative growth of the held-out error without an effect from which the effect is kept, if significant. It covers selection bias: models
+/// without the effect had fewer start values.
 pub(super) const MIN_EFFECT_LOSS: f64 = 0.05;
-/// Significance level for reporting an effect by held-out loss. Stick-slip needs two effects, delayed
-/// puncture and release: 1 % false positives per set.
+/// Significance level for reporting an effect by held-out loss. Stick-slip, delayed puncture and release are tested, so a set has about 1 %
+/// false positives.
 const FALSE_POSITIVE_LEVEL: f64 = 0.005;
 
 /// Probability that errors `without` a term exceed those `with` it (one-sided paired t test over
@@ -22,9 +22,8 @@ pub(super) fn paired_confidence(without: &[f64], with: &[f64]) -> f64 {
     student_t::cdf(stylet_stats::mean(&differences) / error.max(1e-9), differences.len() as f64 - 1.0)
 }
 
-/// Relative loss per recording `without` a term: squared errors by phase, each scaled by the mean square of
-/// that phase over all recordings. Scaling by phase is the likelihood of phase-wise noise: the time of a
-/// puncture is mostly chance, a hold is not.
+/// Relative loss per recording `without` a term: difference of the squared errors, each phase scaled by its mean square over all
+/// recordings. This is the likelihood of phase-wise noise: the time of a puncture is more random than a hold.
 pub(super) fn relative_losses(
     without: &[Option<PredictionScore>],
     with: &[Option<PredictionScore>],
@@ -54,23 +53,22 @@ pub(super) fn relative_losses(
     without.iter().zip(with).map(one).collect()
 }
 
-/// Whether the mean loss is at least `min_loss` and more than one standard error over the recordings.
+/// Whether the mean loss is at least `min_loss` and exceeds one standard error over the recordings.
 pub(super) fn exceeds_standard_error(losses: &[f64], min_loss: f64) -> bool {
     exceeds(losses, min_loss, 1.0)
 }
 
-/// Whether an effect is significant: Student's distribution accounts for the uncertain standard error of
-/// few recordings.
+/// Whether an effect is significant in a one-sided t test, which accounts for the uncertain standard error of few recordings.
 pub(super) fn is_significant(losses: &[f64]) -> bool {
     let dof = losses.len().saturating_sub(1).max(1) as f64;
     exceeds(losses, MIN_EFFECT_LOSS, student_t::quantile(1.0 - FALSE_POSITIVE_LEVEL, dof))
 }
 
-/// Whether the mean loss is at least `min_loss` and more than `standard_errors` standard errors.
+/// Whether the mean loss is at least `min_loss` and exceeds `standard_errors` standard errors.
 fn exceeds(losses: &[f64], min_loss: f64, standard_errors: f64) -> bool {
     let mean = stylet_stats::mean(losses);
     let error = stylet_stats::sd(losses) / (losses.len() as f64).sqrt();
-    // The relative loss of squares is twice that of their roots.
+    // The relative loss of squares is twice that of RMS errors.
     mean >= 2.0 * min_loss && (mean == f64::INFINITY || mean > standard_errors * error)
 }
 

@@ -1,4 +1,4 @@
-//! Phases of an insertion.
+//! Phases of an insertion as a function of time.
 
 use super::segmented_recording::SegmentedRecording;
 
@@ -7,7 +7,7 @@ use super::segmented_recording::SegmentedRecording;
 pub enum InsertionPhase {
     /// In air and up to the first rupture.
     Loading,
-    /// Behind the first rupture, advancing.
+    /// Advance after the first rupture.
     Cutting,
     /// At rest at the deepest point.
     Hold,
@@ -15,7 +15,7 @@ pub enum InsertionPhase {
     Retraction,
 }
 
-/// Phase at a time; the first rupture is at `first_s`.
+/// Phase at a time; the first rupture is at `first_s` (s).
 #[must_use]
 pub fn phase_at(run: &SegmentedRecording, time_s: f64, first_s: f64) -> InsertionPhase {
     let at = |i: usize| run.recording.time_s.get(i).copied().unwrap_or(f64::INFINITY);

@@ -1,4 +1,4 @@
-//! Composition of layers that were measured alone, compared with recordings of the whole stack.
+//! Composes models of layers that were measured separately, and compares the prediction with recordings of the whole stack.
 
 use super::cross_validation::{leave_one_out_scores, repeatability_floor, score_prediction};
 use super::multistart_fit::{SetFit, fit_from, set_blocks};
@@ -22,15 +22,15 @@ use stylet_stats::median_of;
 use stylet_stats::parallel::*;
 use stylet_tissue::{AnyEffect, DeepIndentation, Effect, ShaftSlip, Tissue};
 
-/// Seed of the start values.
+/// Seed of the random start values, constant so that equal recordings give equal results.
 const START_VALUE_SEED: u64 = 2;
-/// Smallest thickness of a layer in m.
+/// Smallest thickness of a composed layer in m.
 const MIN_THICKNESS_M: f64 = 1e-3;
 
-/// Fits every layer alone with a model of the given family, stacks the layers and predicts the whole.
+/// Fits every layer separately with a model of the given family, stacks the layers and predicts the recordings of the stack.
 ///
-/// `alone` holds, per layer of the stack, the recordings of that layer alone. Effects that belong to no
-/// layer are taken from the first.
+/// `alone` contains, per layer of the stack, its name and the recordings of that layer alone. Effects that belong to no layer are taken
+/// from the first.
 #[must_use]
 pub fn compose_layers(
     kind: ModelFamily,
@@ -61,8 +61,8 @@ pub fn compose_layers(
         fits.push((Population::from_fit(&fit, &recordings), combined));
     }
     let models: Vec<&Model> = fits.iter().map(|(_, combined)| combined).collect();
-    // The surface of the stack depends on its set-up: it is moved by the difference of the contact
-    // positions, then fitted to the loading of the other recordings. Deeper layers stay where they were.
+    // The surface of the stack depends on its set-up: it is shifted by the difference of the contact positions, then fitted to the loading
+    // of the other recordings. Deeper layers keep their positions.
     let begins = |recordings: &mut dyn Iterator<Item = &SegmentedRecording>| {
         median_of(recordings.map(|r| r.contact_m))
     };
@@ -107,12 +107,11 @@ fn fit_single_layer(
     fit_from(&model, set_blocks(recordings, &artefacts), drops.collect())
 }
 
-/// Effects of a layer measured alone, with the parameters that its own recordings do not identify.
+/// Effects of a layer measured alone, with substitutes for parameters that its recordings do not identify.
 ///
-/// Measured at one speed, the rate exponent is unknown: `rate` is set to `-1 / exponent`, dry friction at
-/// constant plateau. A shaft parameter at its bound is not identified: it is taken from the first layer,
-/// `like`, because the shaft is common to the layers; the push plateau keeps the ratio to the pull plateau,
-/// and the force held right after a rupture stays.
+/// At one speed the rate exponent is not identified: `rate` is set to `-1 / exponent`, which is Coulomb friction at constant plateau. A
+/// shaft parameter at its bound is not identified either: it is taken from the first layer, `like`, because the shaft is the same. The push
+/// plateau then has the same ratio to the pull plateau, and the force held right after a rupture is unchanged.
 fn identified_effects(model: &Model, speed_mps: f64, like: Option<&ShaftSlip>) -> Vec<EffectTerm> {
     let held = |e: usize| {
         model.tied.iter().any(|b| (b.effect, b.parameter, b.tied_to) == (e, SLIP_RATE_INDEX, None))
@@ -157,7 +156,7 @@ fn shaft_slip_of(model: &Model) -> Option<ShaftSlip> {
     })
 }
 
-/// Force (N) that a layer holds right after its rupture; a layer with this puncture force shows no drop.
+/// Force (N) of a layer right after its rupture; with this puncture force it ruptures without a drop.
 fn residual_plateau_n(model: &Model, layer: usize) -> f64 {
     let holds = model.effects.iter().find_map(|c| match c.effect() {
         Some(AnyEffect::ShaftSlip(s)) if s.layer == layer + 1 => Some(s.retained_share * s.push_n),
@@ -175,7 +174,7 @@ fn puncture_force_n(model: &Model, layer: usize) -> Option<f64> {
     delayed.or(model.tissue.layers.get(layer)?.puncture_n)
 }
 
-/// The model with its surface moved by `further_m`; the boundaries beneath the first layer stay.
+/// The model with its surface shifted by `further_m`; the boundaries below the first layer are unchanged.
 fn with_moved_surface(combined: &Model, further_m: f64) -> Model {
     let mut out = combined.clone();
     out.tissue.surface_m += further_m;
@@ -185,8 +184,8 @@ fn with_moved_surface(combined: &Model, further_m: f64) -> Model {
     out
 }
 
-/// Shift (m) of the surface that fits the loading of a recording, from contact to the first rupture:
-/// Gauss-Newton with a one-sided difference.
+/// Shift (m) of the surface that fits the loading of a recording from contact to the first rupture, by Gauss-Newton steps with a one-sided
+/// difference.
 fn surface_shift_m(combined: &Model, run: &SegmentedRecording) -> f64 {
     let mut combined = combined.clone();
     (combined.per_recording, combined.rupture_times_s) =
@@ -214,12 +213,11 @@ fn surface_shift_m(combined: &Model, run: &SegmentedRecording) -> f64 {
     further_m
 }
 
-/// Stack of several single-layer models: each layer where it was found, the surface moved by `moved_m`.
+/// Stacks single-layer models at their measured positions, with the surface shifted by `moved_m`.
 ///
-/// A layer in a stack deforms its far boundary, which a layer measured alone cannot show: where all
-/// puncture forces are known, layers rupture by force and not at the boundary at rest (`deep_indentation`
-/// at its upper bound). The layers are loaded in series, so a layer with a lower puncture force than the
-/// one above ruptures together with it.
+/// In a stack a layer deforms its far boundary, which a layer alone cannot show. If all puncture forces are known, layers therefore rupture
+/// by force and not at the boundary at rest (`deep_indentation` at its upper bound). The layers are loaded in series, so a layer with a
+/// lower puncture force than the one above ruptures together with it.
 fn stack_models(assumed: &Tissue, alone: &[&Model], moved_m: f64) -> Option<Model> {
     let first = *alone.first()?;
     let mut model = first.subset(&[]);

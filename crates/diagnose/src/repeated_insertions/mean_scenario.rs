@@ -1,16 +1,16 @@
-//! The mean insertion of repeated recordings as a scenario that can be simulated.
+//! Converts the fitted model of repeated recordings to a scenario of their mean insertion, for simulation.
 
 use super::instrument_faults::InstrumentReport;
 use super::segmented_recording::SegmentedRecording;
 use stylet_identify::model::{EffectTerm, Model};
 use stylet_scenario::{ForceTorque, Motion, Robot, Scenario, Segment, Sensor};
 
-/// Shortest hold (s).
+/// Shortest hold (s) of the scenario's motion.
 const MIN_HOLD_S: f64 = 0.1;
-/// Sensor noise (N) without a recording in air.
+/// Sensor noise (N) if there is no recording in air.
 const DEFAULT_NOISE_N: f64 = 0.01;
 
-/// The model at the mean of its random effects with the motion of the middle recording.
+/// Scenario of the model at the mean of its random effects, with the motion of the middle recording.
 #[must_use]
 pub fn mean_scenario(
     name: &str,

@@ -1,7 +1,7 @@
-//! Diagnosis of repeated insertions into the same tissue: the model is common to all recordings, surface,
-//! friction, puncture forces and selected effect parameters vary between recordings and days.
+//! Diagnosis of repeated insertions into the same tissue: one model for all recordings, in which surface, friction, puncture
+//! forces and selected effect parameters vary between recordings and days (random effects).
 //!
-//! In the order of the data:
+//! Modules in the order of the data flow:
 //!
 //! | module | purpose |
 //! |---|---|
@@ -14,7 +14,7 @@
 //! | [`cross_validation`], [`nested_cross_validation`] | held-out errors and the repeatability floor |
 //! | [`scored_model`], [`held_out_loss`], [`ablation`], [`model_selection`] | comparison of models and of their terms |
 //! | [`parameter_estimates`] | estimates with jackknife intervals |
-//! | [`diagnose_set`](mod@diagnose_set) | the whole diagnosis |
+//! | [`diagnose_set`](mod@diagnose_set) | the complete diagnosis |
 //! | [`repeatability_report`](mod@repeatability_report), [`data_quality_notes`], [`mean_scenario`](mod@mean_scenario) | its results |
 //! | [`layer_composition`] | stack of layers measured alone |
 //! | [`indentation_relaxation`] | specimens indented once and held |

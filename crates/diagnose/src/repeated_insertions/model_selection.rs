@@ -1,5 +1,4 @@
-//! Selection of the model of repeated recordings: base law, base law with library effects, or stick-slip of
-//! the shaft, compared by cross-validation.
+//! Selects the model of repeated recordings by cross-validation: base law, base law with library effects, or stick-slip of the shaft.
 
 use super::ablation::{ModelTerm, ablate};
 use super::multistart_fit::{fit_from, set_blocks};
@@ -17,13 +16,13 @@ use stylet_identify::model::{Model, RecordingParameters};
 use stylet_record::sensor_artefacts::SensorArtefacts;
 use stylet_tissue::Tissue;
 
-/// Approximate number of recordings in the search of the effect library.
+/// Approximate number of recordings used in the search of the effect library, which limits its cost.
 const SEARCH_RECORDINGS: usize = 6;
-/// Smallest relative improvement of the held-out error over the base law.
+/// Smallest relative improvement of the held-out error over the base law for another model.
 const MIN_IMPROVEMENT: f64 = 0.02;
-/// A library model with more effects than this competes with the single stick-slip mechanism
+/// Number of effects above which a library model needs a margin over the single stick-slip mechanism.
 const FEW_EFFECTS: usize = 2;
-/// only with a held-out error that is smaller by this share.
+/// Share by which the held-out error of a library model with many effects must be smaller than that of the stick-slip model.
 const MANY_EFFECTS_MARGIN: f64 = 0.1;
 
 /// Candidate models of repeated recordings.
@@ -88,7 +87,7 @@ fn quantisation_noise_n(artefacts: &SensorArtefacts) -> f64 {
     artefacts.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD
 }
 
-/// Candidate with the smallest held-out error; the base law unless another improves by [`MIN_IMPROVEMENT`].
+/// Candidate with the smallest held-out error; the base law unless another improves on it by [`MIN_IMPROVEMENT`].
 pub(super) fn best_candidate<'a>(
     base: &'a ScoredModel,
     slip: Option<&'a ScoredModel>,
@@ -108,7 +107,7 @@ pub(super) fn best_candidate<'a>(
     best
 }
 
-/// About [`SEARCH_RECORDINGS`] recordings, the same number of each group.
+/// About [`SEARCH_RECORDINGS`] recordings with equal numbers from each group, and their indices.
 fn search_subset(
     prepared: &PreparedRecordings,
     recordings: &[&SegmentedRecording],

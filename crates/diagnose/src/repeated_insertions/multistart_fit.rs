@@ -1,5 +1,5 @@
-//! Multi-start fit of repeated recordings. The objective has many local optima; about one start in three
-//! reaches the best.
+//! Multi-start fit of repeated recordings with the stick-slip model. The objective has many local minima; about one start in three reaches
+//! the best.
 
 use super::segmented_recording::{SPEED_TOLERANCE, SegmentedRecording};
 use super::start_values::{
@@ -18,13 +18,13 @@ use stylet_record::sensor_artefacts::SensorArtefacts;
 use stylet_stats::parallel::*;
 use stylet_tissue::{AnyEffect, Effect, Tissue};
 
-/// Block length (s) of repeated recordings: insertions do not repeat more finely.
+/// Block length (s) of repeated recordings: insertions repeat no more precisely than this.
 pub const SET_BLOCK_S: f64 = 0.08;
-/// Blocks of the first fits are longer by this factor.
+/// Factor by which blocks of the first fits are longer.
 const COARSENING_FACTOR: usize = 3;
-/// Initial noise as a share of the largest force.
+/// Standard deviation of the initial noise, as a share of the largest force.
 const INITIAL_NOISE_SHARE: f64 = 0.1;
-/// Weight, in days, of the expected scatter between days.
+/// Weight of the prior scatter between days, in days.
 pub(super) const PRIOR_DAYS: f64 = 4.0;
 /// Iterations of the screening fits, per noise update.
 const SCREENING_TURNS: [usize; 2] = [6, 6];
@@ -34,11 +34,11 @@ const CONTINUED_TURNS: [usize; 2] = [6, 8];
 const CONTINUED_STARTS: usize = 8;
 /// Largest number of distinct optima that are refined.
 const MAX_OPTIMA: usize = 4;
-/// Optima whose RMS residuals differ by less than this share are the same.
+/// Relative difference of the RMS residuals below which two optima are the same.
 const SAME_OPTIMUM: f64 = 0.002;
-/// Optima above this multiple of the best RMS residual are not refined.
+/// Multiple of the best RMS residual above which an optimum is not refined.
 const MAX_RMS_RATIO: f64 = 1.4;
-/// Starts agree when their RMS residuals differ by less than this share.
+/// Relative difference of the RMS residuals below which starts agree with the best.
 const AGREEMENT: f64 = 0.03;
 
 /// A fit of repeated recordings.
@@ -50,7 +50,7 @@ pub struct SetFit {
     pub data: FitData,
     /// Times (s) of the force drops of every recording.
     pub drop_times_s: Vec<Vec<f64>>,
-    /// Number of starts, and how many reached the same RMS residual.
+    /// Number of starts, and number of those that agree with the best.
     pub starts: (usize, usize),
 }
 
@@ -61,7 +61,7 @@ impl SetFit {
         self.fit.rms_n(&self.data)
     }
 
-    /// The same recordings fitted with another model, starting from its values.
+    /// Fits another model to the same recordings, from its own values.
     #[must_use]
     pub fn refit_with(&self, model: &Model) -> Option<Self> {
         let (fit, data) = fit_with_noise_updates(model, self.data.clone(), &self.drop_times_s, &[6])?;
@@ -95,7 +95,7 @@ pub fn fit_from(model: &Model, blocks: Vec<BlockAverages>, drops: Vec<Vec<f64>>)
     Some(SetFit { fit, data, drop_times_s: drops, starts: (1, 1) })
 }
 
-/// Start values number `k`: the middle of the range for 0, random in the range otherwise.
+/// Start values number `k`: the middle of the ranges for 0, else random.
 fn start_values(k: usize, rng: &mut ChaCha8Rng) -> StartValues {
     let mut within = |(low, high): (f64, f64)| {
         let drawn = rng.random::<f64>();
@@ -116,12 +116,12 @@ fn start_values(k: usize, rng: &mut ChaCha8Rng) -> StartValues {
         time_constants_s: [fast, slow],
         delay_exponent: delay,
         surface_m: within((-1.5e-3, 5e-4)),
-        // Deeper layers rupture at the visible drop, or shortly behind their front without a drop.
+        // Deeper layers rupture at the visible drop (negative values), or at this depth without a drop.
         rupture_depth_m: Some(within((-4e-3, 6e-3))).filter(|m| *m > 0.0),
     }
 }
 
-/// Fits in rounds; before each, noise, rupture times and scatter are updated from the previous one.
+/// Fits in rounds; before each, noise, rupture times and scatter are updated from the previous fit.
 #[must_use]
 pub fn fit_with_noise_updates(
     model: &Model,
@@ -157,9 +157,8 @@ fn ln_speed(blocks: &BlockAverages) -> f64 {
     libm::log(1e3 * stylet_stats::median_of(advance))
 }
 
-/// Moves the part of the day effects on friction that is linear in the logarithm of speed into the rate
-/// exponent. Both give the same force; the second has the smaller day effects, and a fit hardly moves along
-/// this valley.
+/// Moves the part of the day effects on friction that is linear in the logarithm of speed to the rate exponent. The force is the same, but
+/// the day effects are smaller, and a fit makes little progress along this valley of the objective.
 fn move_day_trend_to_rate(model: &mut Model, data: &FitData) {
     let held = |e: usize| {
         model.tied.iter().any(|b| (b.effect, b.parameter, b.tied_to) == (e, SLIP_RATE_INDEX, None))
@@ -195,9 +194,8 @@ fn move_day_trend_to_rate(model: &mut Model, data: &FitData) {
     }
 }
 
-/// Updates the scatter between recordings and between days: mean square of the estimates plus their
-/// conditional variance (expectation maximisation with the curvature of the fit). A parameter without
-/// information keeps its scatter.
+/// Updates the scatter between recordings and between days: mean square of the estimates plus their conditional variance (expectation
+/// maximisation with the curvature of the fit). A parameter without information keeps its scatter.
 fn update_scatter(model: &mut Model, data: &FitData, at: &Fit) {
     let tangent = Linearization::new(&at.model, data, &at.residuals);
     let (count, random_effects) = (data.recording_count(), tangent.per_recording.len());
@@ -212,7 +210,7 @@ fn update_scatter(model: &mut Model, data: &FitData, at: &Fit) {
     };
     let mut sums = vec![(0.0, 0.0); random_effects];
     for r in 0..count {
-        // A random effect without information is skipped.
+        // Random effects without information are skipped.
         let moves: Vec<usize> = (0..random_effects)
             .filter(|o| tangent.normal_matrix.at(tangent.index_of(*o, r), tangent.index_of(*o, r)) > 0.0)
             .collect();
@@ -242,7 +240,7 @@ fn update_scatter(model: &mut Model, data: &FitData, at: &Fit) {
         days[kind].0 += model.get(n.role, 0).powi(2) + conditional(&[i])[0];
         days[kind].1 += 1.0;
     }
-    // Few days determine their scatter poorly: the expected value counts as `PRIOR_DAYS` more days.
+    // The scatter between few days is uncertain: the prior value counts as `PRIOR_DAYS` further days.
     let spread = |(sum, n): (f64, f64), expected: f64| {
         ((sum + PRIOR_DAYS * expected * expected) / (n + PRIOR_DAYS)).sqrt()
     };
@@ -261,8 +259,7 @@ fn fit_all(models: &[Model], data: &FitData, drops: &[Vec<f64>], rounds: &[usize
     found
 }
 
-/// Given RMS residuals in ascending order: how many agree with the best, and the indices of the distinct
-/// optima to refine.
+/// For RMS residuals in ascending order: number that agree with the best, and indices of the distinct optima to refine.
 fn distinct_optima(errors: &[f64]) -> (usize, Vec<usize>) {
     let best = errors.first().copied().unwrap_or(f64::NAN);
     let agree = errors.iter().filter(|e| **e < best * (1.0 + AGREEMENT)).count();
@@ -275,7 +272,7 @@ fn distinct_optima(errors: &[f64]) -> (usize, Vec<usize>) {
     (agree, apart)
 }
 
-/// Start models of a multi-start fit; `rng` draws the start values.
+/// Start models of a multi-start fit with random start values.
 #[must_use]
 pub fn draw_starts(
     assumed: &Tissue,
@@ -286,10 +283,9 @@ pub fn draw_starts(
     (0..starts.max(1)).map(|k| shaft_slip_start(assumed, recordings, &start_values(k, rng))).collect()
 }
 
-/// Multi-start fit: the distinct best optima, smallest RMS residual first.
+/// Multi-start fit: returns the distinct best optima, smallest RMS residual first.
 ///
-/// The smallest residual need not predict best; the caller compares held-out errors. Deterministic for any
-/// number of threads.
+/// The smallest residual may not predict best, so the caller compares held-out errors. The result does not depend on the number of threads.
 #[must_use]
 pub fn multistart_fit(
     starts: &[Model],

@@ -1,7 +1,7 @@
 //! Nested cross-validation: held-out errors that include the selection of the model.
 //!
-//! Cross-validation errors of a selected model are biased, because the selection has seen all recordings.
-//! Here the selection, ablation included, is repeated without each fold (Varma and Simon 2006).
+//! The cross-validation error of a selected model is biased, because the selection used all recordings. Here the selection, including
+//! ablation, is repeated without each fold (Varma and Simon 2006).
 
 use super::ablation::ablate;
 use super::cross_validation::{refit_without, training_recordings};
@@ -16,16 +16,16 @@ use serde::Serialize;
 /// Held-out errors with and without selection bias.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NestedCrossValidation {
-    /// Model selected with all recordings, fitted without the fold (N).
+    /// RMS error (N) of the model selected with all recordings and fitted without the fold.
     pub selected_with_n: f64,
-    /// Model selected and fitted without the fold (N).
+    /// RMS error (N) of the model selected and fitted without the fold.
     pub selected_without_n: f64,
     /// Effects selected without each fold.
     pub effects: Vec<Vec<String>>,
 }
 
-/// Repeats the selection without each fold. Start values are those of the fits to all recordings. `None`
-/// when a fold leaves too few recordings.
+/// Repeats the selection without each fold, with the start values of the fits to all recordings. `None` when a fold leaves too few
+/// recordings.
 #[must_use]
 pub fn nested_cross_validation(
     candidates: &CandidateModels,

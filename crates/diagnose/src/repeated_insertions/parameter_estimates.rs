@@ -1,4 +1,4 @@
-//! Parameter estimates with jackknife confidence intervals.
+//! Parameter estimates with jackknife confidence intervals over recordings.
 
 use super::cross_validation::HeldOutPrediction;
 use super::multistart_fit::SetFit;
@@ -8,7 +8,7 @@ use stylet_identify::model::{Model, ParameterRole};
 use stylet_stats::{sd, student_t};
 use stylet_tissue::Tissue;
 
-/// A parameter closer to its bound than this share of its range (at most this much) is at the bound.
+/// Distance to its bound within which a parameter is at the bound, as a share of its range (of at most one).
 const BOUND_TOLERANCE: f64 = 1e-3;
 
 /// Estimate of a parameter.
@@ -44,7 +44,7 @@ pub(super) fn is_at_bound(model: &Model, role: ParameterRole) -> bool {
     })
 }
 
-/// Owner, path, value and whether the value is at its bound.
+/// Owner and path of every parameter, its value, and whether it is at its bound.
 fn parameter_values(model: &Model) -> Vec<(String, String, f64, bool)> {
     let reached = |role: ParameterRole| is_at_bound(model, role);
     let mut out = Vec::new();
@@ -92,8 +92,7 @@ fn parameter_values(model: &Model) -> Vec<(String, String, f64, bool)> {
     out
 }
 
-/// Estimates with 95 % jackknife intervals over recordings (Quenouille, Tukey), which include model error
-/// that differs between recordings.
+/// Estimates with 95 % jackknife intervals over recordings (Quenouille, Tukey). They include model error that differs between recordings.
 #[must_use]
 pub fn jackknife_estimates(fitted: &SetFit, out: &[HeldOutPrediction]) -> Vec<ParameterEstimate> {
     let others: Vec<_> =

@@ -1,4 +1,4 @@
-//! Predicted forces of new recordings: mean and band over draws of a population.
+//! Predicts forces of new recordings: mean and band over draws of a population.
 
 use super::insertion_phase::phase_at;
 use super::random_effects_population::{Population, QUANTILES};
@@ -8,10 +8,10 @@ use stylet_record::Recording;
 use stylet_stats::linear_algebra::CholeskyFactor;
 use stylet_tissue::{ForceLawState, SensorInput, ShaftFriction};
 
-/// Draws of a prediction.
+/// Number of draws of a prediction; with the residual quantiles they give 640 values per sample.
 pub const DRAWS: usize = 64;
 
-/// Force (N) of the `k`-th new recording (from 1 on) with the motion of `run`, without residual.
+/// Force (N) of the `k`-th new recording (from 1) with the motion of `run`, without residual.
 #[must_use]
 pub fn draw_force(
     population: &Population,
@@ -72,7 +72,7 @@ pub struct PredictedForce {
 pub(super) const Z90: f64 = 1.644_853_626_951_472_2;
 
 impl PredictedForce {
-    /// Widens the band by an independent error of this standard deviation (N).
+    /// Widens the band by an independent error with standard deviation `sd_n` (N) per sample.
     pub(super) fn widen(&mut self, sd_n: &[f64]) {
         for ((mean, sd), (low, high)) in
             self.mean_n.iter().zip(sd_n).zip(self.low_n.iter_mut().zip(&mut self.high_n))
@@ -83,7 +83,7 @@ impl PredictedForce {
     }
 }
 
-/// Predicts the force of a recording from its motion.
+/// Predicts the force of a recording from its motion, on a known day or, for `None`, on a random one.
 #[must_use]
 pub fn predict_force(
     population: &Population,
@@ -161,8 +161,7 @@ fn parameter_sd_n(
     Some((0..center.len()).map(sd).collect())
 }
 
-/// Shaft friction of the mean model, which a compensation evaluates sample by sample for a given number of
-/// punctured layers.
+/// Shaft friction of the mean model, for compensation sample by sample with a given number of punctured layers.
 #[must_use]
 pub fn friction_model(population: &Population, recording: &Recording) -> Option<ShaftFriction> {
     let mut model = population.model.clone();

@@ -1,4 +1,4 @@
-//! Population of recordings: random effects, residual distribution and draws of new recordings.
+//! Population of recordings: distribution of random effects and residuals, and draws of new recordings.
 
 use super::insertion_phase::phase_at;
 use super::instrument_faults::fit_trend;
@@ -14,22 +14,22 @@ use stylet_stats::normal::quantile;
 use stylet_stats::{median_of, quantile_of_sorted, sorted, student_t};
 use stylet_tissue::Effect;
 
-/// Equally likely values of a residual; the outermost of ten are the ends of a 90 % band.
+/// Number of equally likely values of a residual; the outermost of ten are the ends of a 90 % band.
 pub const QUANTILES: usize = 10;
 /// Bases of the Halton sequence.
 const PRIMES: [usize; 24] =
     [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71, 73, 79, 83, 89];
-/// Samples of a window for the noise about a line.
+/// Samples per window in which the noise about a line is measured.
 const NOISE_WINDOW: usize = 8;
 
 /// Fitted model with the distribution of random effects and residuals.
 #[derive(Clone, Debug)]
 pub struct Population {
-    /// The model without recordings.
+    /// The model, without per-recording parameters.
     pub model: Model,
     /// RMS residual (N) in tissue by [`InsertionPhase`](super::insertion_phase::InsertionPhase), including the noise of single samples.
     pub residual_n: [f64; 4],
-    /// Quantiles of the residual by phase; the distribution has heavy tails near ruptures and releases.
+    /// Quantiles of the residual (N) by phase; its distribution has heavy tails near ruptures and releases.
     pub residual_quantiles_n: [[f64; QUANTILES]; 4],
     /// The same in air, where the residual is sensor noise.
     pub air_quantiles_n: [f64; QUANTILES],
@@ -50,7 +50,7 @@ impl Population {
         for (r, (b, e)) in fitted.data.recordings.iter().zip(&fitted.fit.residuals.residual_n).enumerate() {
             let first = model.rupture_times_s[r].iter().copied().fold(NO_RUPTURE, f64::min);
             for k in (0..b.len()).filter(|k| b.used[*k]) {
-                // In air the modelled force is zero.
+                // In air the predicted force is zero.
                 if e[k] == b.force_n[k] {
                     air.push(e[k]);
                 } else {
@@ -59,7 +59,7 @@ impl Population {
                 }
             }
         }
-        // Blocks average the noise of single samples.
+        // Adds the noise of single samples, which blocks average.
         let noise_n = median_of(recordings.iter().map(|r| sample_noise_n(&r.recording)));
         let square = |e: &[f64]| e.iter().map(|e| e * e).sum::<f64>() / f64::max(e.len() as f64, 1.0);
         let residual_n = std::array::from_fn(|p| (square(&left[p]) + noise_n * noise_n).sqrt());
@@ -77,7 +77,7 @@ impl Population {
         }
     }
 
-    /// Adds the uncertainty of the shared parameters, needed to predict a speed that was held out.
+    /// Adds the uncertainty of the shared parameters, for predictions of a held-out speed.
     #[must_use]
     pub fn with_parameter_uncertainty(self, fitted: &SetFit) -> Self {
         let model = &fitted.fit.model;
@@ -89,14 +89,14 @@ impl Population {
         Self { parameter_information: open, ..self }
     }
 
-    /// Ratio of the scatter of a new recording to that of a fitted one about the mean of `n`:
-    /// `sqrt((n + 1)/(n - 1))`. Residuals are not widened: their mean is determined by many blocks.
+    /// Ratio of the scatter of a new recording to that of a fitted one about the mean of `n`: `sqrt((n + 1)/(n - 1))`. Residuals are not
+    /// scaled, because many blocks determine their mean.
     pub(super) fn new_recording_factor(&self) -> f64 {
         let n = self.recordings.max(2) as f64;
         ((n + 1.0) / (n - 1.0)).sqrt()
     }
 
-    /// Model of the `k`-th new recording, from 1 on; on a known or a drawn day.
+    /// Model of the `k`-th new recording (from 1), on a known day or a random one.
     pub(super) fn draw(&self, k: usize, day: Option<usize>) -> Model {
         let mut dimension = 0;
         let mut place = || {
@@ -104,8 +104,8 @@ impl Population {
             dimension += 1;
             halton(k, base)
         };
-        // Mean and standard deviation of few recordings are uncertain: Student's distribution. The degrees
-        // of freedom of the sum follow Satterthwaite (1946) with equal shares.
+        // Student's t, because mean and standard deviation of few recordings are uncertain. The degrees of freedom of the sum follow
+        // Satterthwaite (1946) with equal shares.
         let vary = 2 + self.model.layers() + self.model.varying_parameters().count();
         let dof = vary as f64 * (self.recordings.max(2) as f64 - 1.0);
         let mut normal = || student_t::quantile(place(), dof) * self.new_recording_factor();
@@ -137,7 +137,7 @@ impl Population {
                 recording_effects.varying[k] = self.model.varying_sd(k) * normal();
             }
         }
-        // Few days, plus the weight of their prior.
+        // Degrees of freedom: the number of days plus the weight of the prior.
         let days = self.days as f64;
         let wide = (1.0 + 1.0 / days.max(1.0)).sqrt();
         let mut of_day = || student_t::quantile(place(), days.max(1.0) + PRIOR_DAYS - 1.0) * wide;
@@ -159,7 +159,7 @@ impl Population {
     }
 }
 
-/// Equally likely values of a normal distribution.
+/// Equally likely values of a normal distribution with standard deviation `sd_n` (N).
 #[must_use]
 pub fn normal_quantiles(sd_n: f64) -> [f64; QUANTILES] {
     std::array::from_fn(|k| sd_n * quantile((k as f64 + 0.5) / QUANTILES as f64))
@@ -176,7 +176,7 @@ fn residual_quantiles(residuals_n: &[f64], noise_n: f64) -> [f64; QUANTILES] {
     })
 }
 
-/// Radical inverse of `k`: Halton sequence.
+/// Radical inverse of `k`: element of the Halton sequence.
 fn halton(mut k: usize, base: usize) -> f64 {
     let (mut share, mut out) = (1.0, 0.0);
     while k > 0 {
@@ -187,7 +187,7 @@ fn halton(mut k: usize, base: usize) -> f64 {
     out
 }
 
-/// Standard deviation (N) of single samples about a local line.
+/// Median standard deviation (N) of single samples about a local line.
 fn sample_noise_n(recording: &Recording) -> f64 {
     let (t, f) = (&recording.time_s, &recording.force_n);
     let of = |(t, f): (&[f64], &[f64])| {

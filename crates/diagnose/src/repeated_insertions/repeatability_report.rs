@@ -16,10 +16,9 @@ pub struct SpeedReport {
     pub speed_mps: f64,
     /// Number of recordings.
     pub recordings: usize,
-    /// Repeatability floor (N): RMS error of the mean of the other recordings; `None` for a single
-    /// recording.
+    /// Repeatability floor (N): RMS error of the mean of the other recordings; `None` for a single one.
     pub floor_n: Option<f64>,
-    /// The floor without the scatter of that mean.
+    /// The floor (N), corrected for the scatter of that mean.
     pub floor_unbiased_n: Option<f64>,
     /// Leave-one-out RMS error of the base law (N).
     pub base_n: f64,
@@ -40,7 +39,7 @@ pub struct SpeedReport {
 /// Held-out error of a model or of a model without one term.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AblationRow {
-    /// Model or term.
+    /// Name of the model or term.
     pub step: String,
     /// Held-out RMS error with it (N).
     pub held_out_n: f64,
@@ -53,7 +52,7 @@ pub struct AblationRow {
 /// Errors in one phase, pooled over recordings.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PhaseReport {
-    /// Loading, puncture window, cutting, hold or retraction.
+    /// One of [`PHASE_NAMES`].
     pub phase: &'static str,
     /// Repeatability floor (N).
     pub floor_n: Option<f64>,
@@ -76,7 +75,7 @@ pub struct Variability {
     pub day_surface_m: f64,
     /// Logarithm of friction between days.
     pub day_friction: f64,
-    /// Per layer: recordings that show its rupture.
+    /// Per layer: number of recordings that show its rupture.
     pub drops: Vec<usize>,
     /// Per layer: mean and standard deviation of the release position (m).
     pub release_positions_m: Vec<Option<(f64, f64)>>,
@@ -97,7 +96,7 @@ pub struct RepeatabilityReport {
     pub phases: Vec<PhaseReport>,
     /// Scatter between recordings and days.
     pub variability: Variability,
-    /// Number of starts, and how many reached the same optimum.
+    /// Number of starts, and number of those that reached the same optimum.
     pub starts: (usize, usize),
     /// Candidate models and terms of the selected model.
     pub ablation: Vec<AblationRow>,
@@ -109,7 +108,7 @@ pub struct RepeatabilityReport {
     pub nested: Option<NestedCrossValidation>,
 }
 
-/// One recording.
+/// Errors and random effects of one recording.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RecordingReport {
     /// Name.
@@ -141,7 +140,7 @@ pub struct RecordingReport {
 pub struct MeanReport {
     /// Repeatability floor (N).
     pub floor_n: Option<f64>,
-    /// The floor without the scatter of the mean (N).
+    /// The floor (N), corrected for the scatter of the mean.
     pub floor_unbiased_n: Option<f64>,
     /// Base law (N).
     pub base_n: f64,
@@ -188,7 +187,7 @@ pub struct ReportInputs<'a> {
     pub floors: &'a [Option<(PredictionScore, usize)>],
 }
 
-/// Compiles the report.
+/// Computes the report.
 #[must_use]
 pub fn repeatability_report(
     s: &ReportInputs,
@@ -247,7 +246,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     stylet_stats::mean(&values.collect::<Vec<_>>())
 }
 
-/// Correction of the floor for the scatter of a mean of `n`.
+/// Factor on the floor that corrects for the scatter of a mean of `n`.
 fn floor_correction(n: usize) -> f64 {
     (n as f64 / (n + 1) as f64).sqrt()
 }

@@ -10,11 +10,11 @@ use stylet_identify::model::Model;
 use stylet_stats::parallel::*;
 use stylet_tissue::{Effect, EffectInfo, ShaftSlip};
 
-/// Folds of the cross-validation ...
+/// Number of cross-validation folds for more than [`LEAVE_ONE_OUT_LIMIT`] recordings.
 const FOLDS: usize = 3;
-/// ... of more recordings than this; fewer are left out one by one.
+/// Largest number of recordings that are held out one by one.
 const LEAVE_ONE_OUT_LIMIT: usize = 8;
-/// Coarsening factor of the blocks in cross-validation.
+/// Coarsening factor of the blocks in cross-validation, which limits its cost.
 const COARSENING_FACTOR: usize = 3;
 /// Iterations of a refit in cross-validation.
 pub(super) const REFIT_TURNS: usize = 5;
@@ -60,7 +60,7 @@ impl ScoredModel {
     }
 }
 
-/// The fit on coarser blocks; unchanged if its blocks are coarse already.
+/// The fit on coarser blocks; unchanged if its blocks are already coarse.
 pub(super) fn with_coarse_blocks(fitted: &SetFit) -> SetFit {
     let long = |b: &BlockAverages| b.samples_per_block as f64 * b.sample_step_s > 1.5 * SET_BLOCK_S;
     if fitted.data.recordings.iter().all(long) {
@@ -71,13 +71,13 @@ pub(super) fn with_coarse_blocks(fitted: &SetFit) -> SetFit {
     SetFit { data: fitted.data.with_recordings(blocks), ..fitted.clone() }
 }
 
-/// Cross-validation folds.
+/// Indices of the recordings of each cross-validation fold.
 pub(super) fn folds(total: usize) -> Vec<Vec<usize>> {
     let count = if total <= LEAVE_ONE_OUT_LIMIT { total } else { FOLDS };
     (0..count).map(|k| (k..total).step_by(count.max(1)).collect()).collect()
 }
 
-/// Scores of held-out recordings.
+/// Scores of the held-out recordings `which`.
 pub(super) fn predict_fold(
     population: &Population,
     day_of: &[usize],
@@ -93,7 +93,7 @@ pub(super) fn predict_fold(
     which.iter().map(|r| (*r, one(*r))).collect()
 }
 
-/// Cross-validation scores.
+/// Cross-validation scores per recording; `None` without a prediction.
 pub(super) fn cross_validate(
     fitted: &SetFit,
     recordings: &[&SegmentedRecording],
@@ -114,7 +114,7 @@ pub(super) fn cross_validate_speeds(
     }
 }
 
-/// Scores of every recording, predicted by a fit without its part; `day_of` gives known days.
+/// Scores of every recording, predicted by a fit without its part; `day_of` are the known days.
 fn held_out_scores(
     at: &SetFit,
     recordings: &[&SegmentedRecording],
@@ -146,7 +146,7 @@ pub fn shaft_slip_info() -> &'static EffectInfo {
     ShaftSlip::default().info()
 }
 
-/// Active effects of a model, each once.
+/// Active effects of a model, without repetition.
 #[must_use]
 pub fn active_effects(model: &Model) -> Vec<&'static str> {
     let mut out: Vec<&str> = Vec::new();

@@ -1,4 +1,4 @@
-//! Recordings of insertions with their phases and events, and their groups by speed and stroke.
+//! Segments recordings of insertions into phases and events, and groups them by speed and stroke.
 
 use stylet_identify::insertion_phases::{
     AbruptDrop, InsertionPhases, abrupt_drops, contact_m, detect_phases, noise_n, releases, rupture_samples,
@@ -7,12 +7,12 @@ use stylet_identify::model::NO_RUPTURE;
 use stylet_record::{QualityNote, Recording};
 use stylet_stats::order_statistics::median_of;
 
-/// Relative tolerance of speeds of one group; a group counts as one day.
+/// Relative tolerance of the speeds in a group, which is assumed to be recorded on one day.
 pub(super) const SPEED_TOLERANCE: f64 = 0.1;
-/// Tolerance (m) of strokes of one group.
+/// Tolerance (m) of the strokes in a group.
 const STROKE_TOLERANCE_M: f64 = 1e-3;
 
-/// A recording of an insertion with its phases and the events that its force shows.
+/// A recording of an insertion with its phases and detected events.
 #[derive(Clone, Debug)]
 pub struct SegmentedRecording {
     /// Name.
@@ -27,15 +27,15 @@ pub struct SegmentedRecording {
     pub speed_mps: f64,
     /// Largest position in m.
     pub stroke_m: f64,
-    /// Position (m) where the force leaves zero.
+    /// Position (m) at which the force rises from zero.
     pub contact_m: f64,
-    /// Rupture time (s) per layer, [`NO_RUPTURE`] where the force shows none.
+    /// Rupture time (s) per layer; [`NO_RUPTURE`] without a visible drop.
     pub ruptures_s: Vec<f64>,
     /// Force (N) just before the rupture, per layer.
     pub loads_n: Vec<Option<f64>>,
-    /// Release position (m) during retraction, per layer, where the force shows it.
+    /// Release position (m) during retraction per layer, if visible.
     pub releases_m: Vec<Option<f64>>,
-    /// Saturation limit (N), where it was reached; forces beyond it are not compared.
+    /// Saturation limit (N), if reached; forces above it are not compared.
     pub limit_n: Option<f64>,
 }
 
@@ -46,7 +46,7 @@ impl SegmentedRecording {
         let at = detect_phases(&recording);
         let ruptures = rupture_samples(&abrupt_drops(&recording, &at), layers);
         let found = releases(&recording, &at, layers);
-        // With fewer releases than layers only the last one can be assigned: the first layer's.
+        // Of fewer releases than layers, only the last one can be assigned, to the first layer.
         let releases_m = (0..layers)
             .map(|l| if found.len() == layers || l == 0 { found.get(l).map(|r| r.position_m) } else { None })
             .collect();
@@ -72,7 +72,7 @@ impl SegmentedRecording {
 }
 
 impl SegmentedRecording {
-    /// Sudden force drops before the retraction.
+    /// Abrupt force drops before the retraction.
     #[must_use]
     pub fn drops(&self) -> Vec<AbruptDrop> {
         abrupt_drops(&self.recording, &self.phases)

@@ -1,4 +1,4 @@
-//! Start values and priors from the raw forces, before any fit.
+//! Computes start values and priors from the raw forces, before any fit.
 
 use super::segmented_recording::{SegmentedRecording, group_by_speed_and_stroke, have_one_speed};
 use std::sync::Arc;
@@ -8,36 +8,35 @@ use stylet_identify::model::{
 use stylet_stats::order_statistics::median_of;
 use stylet_tissue::{AnyEffect, DelayedPuncture, Effect, ReleaseDepth, ShaftSlip, Tissue};
 
-/// Prior standard deviation (m) of the surface about the point where the force first rises.
+/// Prior standard deviation (m) of the surface about the position at which the force first rises.
 const SURFACE_SD_M: f64 = 1.5e-3;
-/// The same for a blunt indenter, which rests on soft tissue before it presses.
+/// Prior standard deviation (m) of the surface for a blunt indenter, which first rests on soft tissue.
 const INDENTATION_SURFACE_SD_M: f64 = 2e-3;
-/// Index of `rate` among the parameters of `shaft_slip`, and of `exponent` among those of
-/// `delayed_puncture`.
+/// Index of `rate` among the parameters of `shaft_slip`.
 pub(super) const SLIP_RATE_INDEX: usize = 6;
+/// Index of `exponent` among the parameters of `delayed_puncture`.
 const DELAY_EXPONENT_INDEX: usize = 2;
 /// Relative prior standard deviation of a thickness.
 const RELATIVE_THICKNESS_SD: f64 = 0.2;
-/// Share of the load before a rupture that friction carries in the base law.
+/// Share of the load before a rupture that friction carries in the start values of the base law.
 const FRICTION_LOAD_SHARE: f64 = 0.3;
-/// Factor within which the stiffness may differ from its start value.
+/// Relative prior standard deviation of stiffness, friction and puncture force about their start values.
 const STIFFNESS_FACTOR: f64 = 4.0;
-/// Expected standard deviation (m) of the surface between days: ten times the repeatability of a stage.
+/// Prior standard deviation (m) of the surface between days: ten times the repeatability of a stage.
 pub const EXPECTED_DAY_SURFACE_SD_M: f64 = 3e-4;
-/// Expected standard deviation of the logarithm of friction between days: that between recordings of one
-/// day.
+/// Prior standard deviation of the logarithm of friction between days: as between recordings of one day.
 pub const EXPECTED_DAY_FRICTION_SD: f64 = 0.03;
 
-/// Start values that several starts vary, because the raw force does not determine them.
+/// Start values that differ between starts, because the raw force does not determine them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartValues {
     /// Share of the load before the first rupture that the linear spring carries.
     pub linear_share: f64,
-    /// Push plateau of the shaft over that load.
+    /// Push plateau of the shaft, as a share of that load.
     pub hold_ratio: f64,
-    /// Pull plateau over push plateau.
+    /// Pull plateau, as a share of the push plateau.
     pub pull_ratio: f64,
-    /// Share of the plateau that is left after the rupture.
+    /// Share of the plateau that remains after the rupture.
     pub kept_share: f64,
     /// Exponent of the slip law.
     pub exponent: f64,
@@ -47,19 +46,18 @@ pub struct StartValues {
     pub rate: f64,
     /// Relaxing fractions.
     pub fractions: [f64; 2],
-    /// Their time constants in s.
+    /// Time constants of the relaxing fractions in s.
     pub time_constants_s: [f64; 2],
     /// Exponent of the delayed punctures.
     pub delay_exponent: f64,
-    /// Surface relative to the position where the force first rises, in m.
+    /// Surface relative to the position at which the force first rises, in m.
     pub surface_m: f64,
-    /// Rupture depth (m) of deeper layers behind their front; the first layer then ruptures where the force
-    /// reaches the plateau, if it shows no drop. `None`: ruptures at the visible drops, which may be
-    /// remains of a rupture after the layer above has given way.
+    /// Rupture depth (m) of deeper layers behind their front; the first layer then ruptures where the force reaches the plateau, if it
+    /// shows no drop. `None`: layers rupture at the visible drops, which may belong to the layer above.
     pub rupture_depth_m: Option<f64>,
 }
 
-/// Geometry before any fit, and per layer the load before its rupture and the indentation at that load.
+/// Geometry from the raw data; per layer, the load before its rupture and the indentation at that load.
 struct LayerGeometry {
     tissue: Tissue,
     fronts_m: Vec<f64>,
@@ -76,7 +74,7 @@ fn median_over(
     (!all.is_empty()).then(|| median_of(all))
 }
 
-/// LayerGeometry of an assumed tissue with its surface `beyond_m` behind the contact.
+/// Geometry of an assumed tissue, with its surface `beyond_m` behind the contact.
 fn layer_geometry(assumed: &Tissue, recordings: &[&SegmentedRecording], beyond_m: f64) -> LayerGeometry {
     let of = |what: &dyn Fn(&SegmentedRecording) -> Option<f64>| median_over(recordings, what);
     let contact = of(&|r| Some(r.contact_m)).unwrap_or(assumed.surface_m);
@@ -101,7 +99,7 @@ fn layer_geometry(assumed: &Tissue, recordings: &[&SegmentedRecording], beyond_m
         } else {
             layer.thickness_m = layer.thickness_m.max(deepest - fronts_m[l] + 0.02);
         }
-        // In deeper layers friction of the layers above carries a part.
+        // Friction of the layers above carries a part of the load of deeper layers.
         let share = if l == 0 { 1.0 } else { 0.6 };
         let load_n = of(&|r| r.loads_n[l]);
         let load = share * load_n.unwrap_or(largest).max(0.05 * largest);
@@ -130,8 +128,7 @@ pub fn indentation_prior(assumed: &Tissue, run: &SegmentedRecording) -> Assumpti
     Assumptions { surface_tolerance_m: INDENTATION_SURFACE_SD_M, ..weak_prior(tissue) }
 }
 
-/// Prior of the base law: stiffness, friction and puncture force from the raw forces, known to a factor of
-/// a few.
+/// Prior of the base law: stiffness, friction and puncture force from the raw forces, which are accurate to a factor of a few.
 #[must_use]
 pub fn base_law_prior(assumed: &Tissue, recordings: &[&SegmentedRecording]) -> Assumptions {
     let geometry = layer_geometry(assumed, recordings, 0.0);
@@ -147,7 +144,7 @@ pub fn base_law_prior(assumed: &Tissue, recordings: &[&SegmentedRecording]) -> A
     weak_prior(tissue)
 }
 
-/// Weak prior about a tissue.
+/// Weak prior about the parameters of a tissue.
 fn weak_prior(tissue: Tissue) -> Assumptions {
     let layers = tissue.layers.len();
     Assumptions {
@@ -170,9 +167,8 @@ fn first_time_above(run: &SegmentedRecording, force_n: f64) -> f64 {
     at.and_then(|k| run.recording.time_s.get(k)).copied().unwrap_or(NO_RUPTURE)
 }
 
-/// Start model with `shaft_slip`, `delayed_puncture` and `release_depth` in every layer, ruptures at the
-/// force drops. The first layer may rupture without a drop if the shaft holds as much as the layer carries:
-/// then where the force first reaches the plateau.
+/// Start model with `shaft_slip`, `delayed_puncture` and `release_depth` in every layer, and ruptures at the force drops. If the plateau of
+/// the shaft is as high as the load of the first layer, this layer may rupture without a drop, where the force first reaches the plateau.
 #[must_use]
 pub fn shaft_slip_start(assumed: &Tissue, recordings: &[&SegmentedRecording], guess: &StartValues) -> Model {
     let LayerGeometry { mut tissue, fronts_m: fronts, loads_n, indented_m } =
@@ -189,7 +185,7 @@ pub fn shaft_slip_start(assumed: &Tissue, recordings: &[&SegmentedRecording], gu
         let hold = guess.hold_ratio * load;
         let here = effects.len();
         if l == 0 && one_speed {
-            // One speed identifies neither the rate nor the exponent of the delay.
+            // One speed identifies neither the rate exponent nor the exponent of the delay.
             bound.push(TiedParameter { effect: here, parameter: SLIP_RATE_INDEX, tied_to: None });
             bound.push(TiedParameter { effect: here + 1, parameter: DELAY_EXPONENT_INDEX, tied_to: None });
         }
@@ -260,7 +256,7 @@ pub fn shaft_slip_start(assumed: &Tissue, recordings: &[&SegmentedRecording], gu
             }
         }
     }
-    // Releases that a recording shows are start values of its random effects.
+    // Visible releases are start values of the random effects of their recording.
     let differing: Vec<(usize, usize)> = model.varying_parameters().collect();
     for (k, (effect, parameter)) in differing.into_iter().enumerate() {
         let common = model.effects[effect].values[parameter];

@@ -1,4 +1,4 @@
-//! Fit of the stick-slip model from several starts.
+//! Fits the stick-slip model from several starts, and selects an optimum by held-out errors.
 
 use super::ablation::without_effect;
 use super::held_out_loss::{MIN_EFFECT_LOSS, exceeds_standard_error, is_significant, relative_losses};
@@ -10,17 +10,16 @@ use stylet_identify::model::Model;
 use stylet_record::sensor_artefacts::SensorArtefacts;
 use stylet_tissue::{DelayedPuncture, Effect, Tissue};
 
-/// Smallest number of starts of the stick-slip fit; about one in five reaches the best optimum.
+/// Smallest number of starts; about one in five reaches the best optimum.
 const MIN_STARTS: usize = 24;
-/// Product of starts and recordings for small sets, which have worse start values and cheaper fits.
+/// Product of the numbers of starts and recordings for small sets, whose start values are worse and whose fits are cheaper.
 const STARTS_TIMES_RECORDINGS: usize = 300;
 
-/// Fits the stick-slip model: the optimum with the smallest residual, unless another has a significantly
-/// smaller held-out error (the minimum of several held-out errors would be biased against models with a
-/// single fit).
+/// Fits the stick-slip model. Returns the optimum with the smallest residual, unless another has a significantly smaller held-out error;
+/// the minimum over all held-out errors would be biased against models with a single fit.
 ///
-/// At one speed a delayed puncture and a puncture force are equivalent: the delay must improve prediction
-/// over the simpler model from the same starts.
+/// At one speed a delayed puncture is equivalent to a puncture force, so the delay must improve prediction significantly over the simpler
+/// model from the same starts.
 #[must_use]
 pub fn fit_stick_slip(
     assumed: &Tissue,
@@ -47,7 +46,7 @@ pub fn fit_stick_slip(
     }
 }
 
-/// The first model unless others are significantly better; then the best of those.
+/// The first model, or the best of those that are significantly better than it.
 fn best_significant(candidates: Vec<ScoredModel>) -> Option<ScoredModel> {
     let mut best: Option<ScoredModel> = None;
     let first = candidates.first()?.clone();

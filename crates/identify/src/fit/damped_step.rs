@@ -1,16 +1,16 @@
-//! One damped step within bounds.
+//! One Levenberg-Marquardt step within bounds, and its extrapolation.
 
 use super::Linearization;
 use crate::likelihood::FitData;
 use crate::model::{Model, NO_RUPTURE, Parameter, ParameterRole};
 use stylet_stats::linear_algebra::dot;
 
-/// Largest change of a rupture time in one step, in blocks; the derivative is not valid beyond.
+/// Largest change of a rupture time in one step, in blocks; the linearization is not valid beyond.
 const MAX_RUPTURE_STEP_BLOCKS: f64 = 1.5;
 
-/// A step is extrapolated when the estimated minimum along it lies beyond this factor.
+/// Smallest extrapolation factor that is tried; a smaller one gains too little for a further replay.
 const MIN_EXTRAPOLATION: f64 = 1.3;
-/// Largest extrapolation factor.
+/// Largest extrapolation factor, which limits the error of the parabola.
 const MAX_EXTRAPOLATION: f64 = 4.0;
 
 /// Clamps every shared parameter to its bounds.
@@ -23,18 +23,16 @@ pub(super) fn clamp_to_bounds(model: &mut Model) {
     }
 }
 
-/// Extrapolation factor of `delta`: the minimum of the parabola with the slope of the linearization that has
-/// fallen by `gained` at one. Outliers have more weight in the linearization than under the Huber loss, so
-/// plain steps are too short by about the same factor again and again. `None` when extrapolation would not
-/// help.
+/// Extrapolation factor of the step `delta`: minimum of the parabola that has the slope of the linearization at zero and has fallen by
+/// `gained` (nats) at one. The linearization weights outliers more than the Huber loss does, so that full steps are consistently too short.
+/// `None` if the factor is below [`MIN_EXTRAPOLATION`].
 pub(super) fn extrapolation_factor(t: &Linearization, delta: &[f64], gained: f64) -> Option<f64> {
     let falls = dot(&t.neg_gradient, delta);
     let share = if gained < falls { falls / (2.0 * (falls - gained)) } else { MAX_EXTRAPOLATION };
     (share > MIN_EXTRAPOLATION).then_some(share.min(MAX_EXTRAPOLATION))
 }
 
-/// One damped step within bounds over the parameters selected by `among`, in the order of the normal matrix;
-/// `None` when nothing can move.
+/// One damped step within bounds over the parameters with `among(index)`, in the order of the normal matrix; `None` when none can move.
 pub(super) fn damped_step(
     model: &Model,
     data: &FitData,
@@ -57,7 +55,7 @@ pub(super) fn damped_step(
     };
     let mut free: Vec<usize> = (0..size).filter(|i| among(*i) && t.normal_matrix.at(*i, *i) > 0.0).collect();
     let mut delta = vec![0.0; size];
-    // Parameters that hit a bound stay there; the others are solved for again.
+    // Active set: parameters at a bound are fixed there, the others are solved for again.
     for _ in 0..6 {
         let rhs: Vec<f64> = free
             .iter()
@@ -104,7 +102,7 @@ pub(super) fn damped_step(
     Some(delta)
 }
 
-/// The model after a share of a step, within the bounds of the parameters.
+/// The model after `share` of a step, clamped to the bounds of the parameters.
 #[must_use]
 pub fn apply_step(model: &Model, data: &FitData, t: &Linearization, delta: &[f64], share: f64) -> Model {
     let mut next = model.clone();

@@ -1,7 +1,7 @@
 use core::ops::Range;
 use stylet_stats::linear_algebra::dot;
 
-/// One column of the Jacobian of all residuals.
+/// One column of the Jacobian of all residuals, which are normalised by their standard deviations.
 #[derive(Clone, Debug, Default)]
 pub struct JacobianColumn {
     /// Change of the predicted force, whitened and weighted, per recording.
@@ -28,7 +28,7 @@ impl JacobianColumn {
     }
 }
 
-/// Range of blocks with non-zero entries in every recording: many parameters change a short stretch only.
+/// Range of blocks with non-zero entries in every recording: most parameters affect part of a recording.
 pub(super) fn support(column: &JacobianColumn) -> Vec<Range<usize>> {
     let of = |w: &Vec<f64>| {
         let first = w.iter().position(|w| *w != 0.0).unwrap_or(w.len());

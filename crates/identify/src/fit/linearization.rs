@@ -1,4 +1,4 @@
-//! Linearization of a model: derivatives of all residuals and the normal equations.
+//! Jacobian of all residuals of a model, and the normal equations with priors.
 
 use super::jacobian_column::{JacobianColumn, support};
 use crate::forward_model::ReplayResult;
@@ -62,9 +62,8 @@ impl Linearization {
         t
     }
 
-    /// Replaces derivatives by symmetric differences over the widths that `step` returns (per unit). To first
-    /// order an interface that moves shifts a force jump; over its actual uncertainty it is a ramp, which slow
-    /// noise masks far better.
+    /// Replaces derivatives by symmetric differences over the widths `step` (in units of the parameter). The first-order effect of moving
+    /// an interface is a shifted force jump; over its actual uncertainty it is a ramp, which correlated noise can hide.
     #[must_use]
     pub fn with_wide_differences(
         mut self,
@@ -120,7 +119,7 @@ impl Linearization {
             }
         }
         let h = |r: usize| steps.get(r).copied().unwrap_or(steps[0]);
-        // An effect may act from the first sample on.
+        // Effects may act from the first sample on, so no part of the replay can be reused.
         let whole = match n.role {
             ParameterRole::Effect { .. } | ParameterRole::RecordingEffect(_) => true,
             ParameterRole::RecordingFriction | ParameterRole::DayFriction(_) => model.has_friction_effects(),
@@ -138,8 +137,7 @@ impl Linearization {
         column
     }
 
-    /// Difference between `model` and another model as a column: predicted force, whitened and weighted, and
-    /// rupture residuals.
+    /// Difference between the predictions of `other` and `model` as a column: whitened and weighted force, and rupture residuals.
     #[must_use]
     pub fn difference(
         &self,
@@ -151,7 +149,7 @@ impl Linearization {
         self.column_of_change(model, data, at, |r| replay(other, data, r))
     }
 
-    /// The same from the other model's predictions.
+    /// The same, from a function that replays the other model for a recording.
     fn column_of_change(
         &self,
         model: &Model,
@@ -162,7 +160,7 @@ impl Linearization {
         let mut column = JacobianColumn::default();
         for (r, b) in data.recordings.iter().enumerate() {
             let replayed = other(r)?;
-            // Change of the prediction = residual before - residual now.
+            // The residual is measured minus predicted: predicted = y - e.
             let change: Vec<f64> = replayed
                 .force_n
                 .iter()
@@ -197,8 +195,7 @@ impl Linearization {
             g[i] = row[i + 1];
             row[..=i].iter().enumerate().for_each(|(j, x)| h.add(i, j, *x));
         }
-        // Products of each per-recording parameter with the shared ones, with the preceding ones of its
-        // recording, and with the residual.
+        // Products of each per-recording parameter with the shared ones, with the per-recording ones up to itself, and with the residual.
         let row = |k: usize| {
             let (r, i) = (k / no, ns + k % no);
             t.columns[..=i].iter().chain([&t.residual]).map(|c| t.recording_product(i, c, r)).collect()
@@ -229,7 +226,7 @@ impl Linearization {
         (self.normal_matrix, self.neg_gradient) = (h, g);
     }
 
-    /// As [`JacobianColumn::dot`] of a Jacobian column with another one, over the support of the first.
+    /// [`JacobianColumn::dot`] of column `i` with `c`, restricted to the support of column `i`.
     fn recording_product(&self, i: usize, c: &JacobianColumn, r: usize) -> f64 {
         let per_recording = &self.columns[i];
         let blocks = match (self.supports[i].get(r), per_recording.innovations.get(r), c.innovations.get(r)) {
@@ -243,7 +240,7 @@ impl Linearization {
         blocks + per_recording.rupture_rows.get(r).zip(c.rupture_rows.get(r)).map_or(0.0, |(a, b)| dot(a, b))
     }
 
-    /// Scalar products of a column with all Jacobian columns, in the order of the normal matrix.
+    /// Scalar products of `c` with all Jacobian columns, in the order of the normal matrix.
     #[must_use]
     pub fn products_with(&self, c: &JacobianColumn, recordings: usize) -> Vec<f64> {
         let ns = self.shared.len();
@@ -269,7 +266,7 @@ fn weighted(w: &[Vec<f64>], roots: &[Vec<f64>]) -> Vec<Vec<f64>> {
     w.iter().zip(roots).map(|(w, r)| w.iter().zip(r).map(|(w, r)| w * r).collect()).collect()
 }
 
-/// Rupture residuals; their observed value is zero.
+/// Rupture residuals of `now`, scaled by the standard deviations of `at`.
 fn event_rows(model: &Model, now: &Residuals, at: &Residuals) -> Vec<Vec<f64>> {
     now.ruptures
         .iter()

@@ -1,10 +1,10 @@
-//! Bounded, damped least squares (Levenberg-Marquardt) over all parameters, rupture times included.
+//! Maximum a posteriori fit of all parameters and rupture times by bounded Levenberg-Marquardt steps on the Huber loss.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `jacobian_column`, `linearization` | derivative of the residuals by each parameter; normal equations |
+//! | `jacobian_column`, `linearization` | Jacobian of the residuals and normal equations |
 //! | `damped_step` | one damped step within bounds and its extrapolation |
-//! | `nonsmooth` | continues past kinks of the objective |
+//! | `nonsmooth` | continues a fit that stopped at a kink of the objective |
 //! | `scatter_update` | standard deviations of random effects |
 
 mod damped_step;
@@ -71,8 +71,9 @@ impl Effort {
     pub const FULL: Self = Self { max_iterations: 14, min_gain_nats: 0.03 };
 }
 
-/// Damping of the first step, and damping values tried per linearization.
+/// Levenberg-Marquardt damping of the first step, relative to the diagonal of the normal matrix.
 const FIRST_DAMPING: f64 = 1e-4;
+/// Damping values tried per linearization, each eight times the previous one: up to steps of a millionth.
 const MAX_DAMPING_TRIALS: usize = 7;
 
 /// Fits a model from its current parameters.
@@ -81,15 +82,14 @@ pub fn fit(model: &Model, data: &FitData, effort: Effort) -> Option<Fit> {
     fit_if_below(model, data, effort, f64::INFINITY)
 }
 
-/// As [`fit`], but stops when the objective would not fall below `wanted` nats even if every remaining step
-/// gained as much as the last one.
+/// As [`fit`], but stops when the objective would stay above `target_nats` even if every remaining step gained as much as the last one.
 #[must_use]
 pub fn fit_if_below(model: &Model, data: &FitData, effort: Effort, target_nats: f64) -> Option<Fit> {
     descend(model, data, effort, target_nats, update_scatter)
 }
 
-/// As [`fit`]; where ruptures scatter, also starts from zero scatter and keeps the better result. Under a wide
-/// scatter a small offset costs nothing and stays.
+/// As [`fit`]; if ruptures scatter between recordings, also fits from zero scatter and returns the better result. Under a wide scatter, a
+/// small offset of a rupture has almost no cost, so the first fit can stop at a local minimum.
 #[must_use]
 pub fn fit_from_zero_scatter(model: &Model, data: &FitData, effort: Effort) -> Option<Fit> {
     let wide = fit(model, data, effort)?;
@@ -104,7 +104,7 @@ pub fn fit_from_zero_scatter(model: &Model, data: &FitData, effort: Effort) -> O
     Some(sharp.filter(|f| f.nats() < wide.nats()).unwrap_or(wide))
 }
 
-/// Descends from `model`; `scatter` re-estimates the random-effect scatter after each step.
+/// Descends from `model`; `scatter` re-estimates the random-effect standard deviations after each step.
 fn descend(
     model: &Model,
     data: &FitData,

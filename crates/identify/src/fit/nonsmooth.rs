@@ -1,4 +1,4 @@
-//! Fits past kinks of the objective.
+//! Continues a fit that stopped at a kink of the objective.
 
 use super::damped_step::{apply_step, damped_step};
 use super::{Effort, FIRST_DAMPING, Fit, Linearization, MAX_DAMPING_TRIALS, fit};
@@ -7,14 +7,14 @@ use crate::model::Model;
 use stylet_stats::linear_algebra::dot;
 use stylet_stats::parallel::*;
 
-/// Predicted gain in nats below which a point without a descending step counts as a minimum.
+/// Predicted gain (nats) of a full step below which a point counts as a minimum.
 const MIN_PREDICTED_GAIN_NATS: f64 = 1.0;
-/// Largest number of restarts.
+/// Largest number of restarts from a kink.
 const MAX_RESTARTS: usize = 3;
 
-/// As [`fit`], but continues where the linearization predicts a gain that no step along it achieves: then only
-/// those parameters move that improve the objective by a step of their own. Stick-slip and presliding laws have
-/// kinks, and a derivative across a kink holds on neither side.
+/// As [`fit`], but restarts where the linearization predicts a gain that no damped step achieves. A restart moves only the parameters whose
+/// individual steps improve the objective: stick-slip and presliding friction have kinks, and the derivative on one side of a kink is wrong
+/// on the other.
 #[must_use]
 pub fn fit_nonsmooth(model: &Model, data: &FitData, effort: Effort) -> Option<Fit> {
     let mut best = fit(model, data, effort)?;
@@ -31,7 +31,7 @@ pub fn fit_nonsmooth(model: &Model, data: &FitData, effort: Effort) -> Option<Fi
     Some(best)
 }
 
-/// A better model near a point at which no step along the full linearization achieves the predicted gain.
+/// A better model near a point at which the predicted gain of a full step is not achieved; `None` at a minimum.
 pub(super) fn escape_kink(at: &Fit, data: &FitData) -> Option<Model> {
     let linearization = Linearization::new(&at.model, data, &at.residuals);
     let whole = damped_step(&at.model, data, &linearization, FIRST_DAMPING, |_| true)?;

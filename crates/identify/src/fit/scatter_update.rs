@@ -1,16 +1,15 @@
-//! Updates standard deviations of random effects during a fit.
+//! Re-estimates the standard deviations of random effects after each step of a fit.
 
 use crate::likelihood::{Residuals, neg_log_posterior};
 use crate::model::{Model, Scatter};
 use crate::rupture_likelihood::{RuptureEvent, estimate_rupture_scatter};
 
-/// Lower bound of a standard deviation between recordings, as a share of the library's value: a small sample
-/// does not show that it is zero.
+/// Lower bound of a standard deviation between recordings, as a share of the library's value: from a few recordings the maximum-likelihood
+/// estimate can collapse to zero.
 const MIN_SHARE_OF_LIBRARY_SD: f64 = 0.1;
 
-/// Scatter of rupture forces and depths. With fixed random-effect scatter it is that of the layer with the
-/// largest one: a rupture time without a visible force drop is set to where the law expects it and would
-/// suggest zero scatter.
+/// Standard deviations of rupture force and depth. With fixed random-effect scatter, the maximum over layers is used: a rupture without a
+/// visible force drop is placed where the model predicts it, and would bias the estimate to zero.
 fn rupture_scatter(model: &Model, events: &[Vec<RuptureEvent>]) -> Scatter {
     let of = |layer: &dyn Fn(usize) -> bool| -> Scatter {
         let chosen = events.iter().flat_map(|e| e.iter().enumerate()).filter(|e| layer(e.0)).map(|e| *e.1);
@@ -28,7 +27,7 @@ fn rupture_scatter(model: &Model, events: &[Vec<RuptureEvent>]) -> Scatter {
     .unwrap_or(model.scatter)
 }
 
-/// Re-estimates the scatter between recordings.
+/// Re-estimates the standard deviations between recordings and updates the objective.
 pub(super) fn update_scatter(model: &mut Model, at: &mut Residuals) {
     model.scatter = rupture_scatter(model, &at.ruptures);
     let spread = |x: &dyn Fn(usize) -> f64, least: f64| {

@@ -2,7 +2,7 @@ use super::time_stepper::TimeStepper;
 use crate::rupture_likelihood::RuptureEvent;
 use stylet_tissue::{ForceLawState, MeasurementState};
 
-/// Complete state of a replay before a piece.
+/// Complete state of a replay before piece `piece`.
 #[derive(Clone, Debug)]
 pub(super) struct Checkpoint {
     pub(super) piece: usize,
@@ -17,7 +17,7 @@ pub(super) struct Checkpoint {
     pub(super) ruptures: Vec<RuptureEvent>,
 }
 
-/// Current state of a replay before a piece.
+/// Borrowed state of a running replay before piece `piece`.
 pub(super) struct CheckpointView<'a, 'b> {
     pub(super) piece: usize,
     pub(super) stepper: &'a TimeStepper<'b>,
@@ -42,7 +42,7 @@ impl CheckpointView<'_, '_> {
         }
     }
 
-    /// Whether the remaining replay is the same as from `other`.
+    /// Whether a replay continued from here equals one continued from `other`.
     pub(super) fn same_future_as(&self, other: &Checkpoint) -> bool {
         let stepper = self.stepper;
         self.piece == other.piece

@@ -1,4 +1,4 @@
-//! A replay from which similar models are replayed in part.
+//! Replays models that differ in one base parameter or rupture time, by reusing the unchanged part of a stored replay.
 
 use super::checkpoint::Checkpoint;
 use super::{ReplayResult, advance, initial_checkpoint, replay_with_ruptures};
@@ -6,7 +6,7 @@ use crate::block_averages::BlockAverages;
 use crate::model::{CompiledModel, NO_RUPTURE};
 use crate::motion::MotionPiece;
 
-/// A replay with its checkpoints: a similar model needs only the part that differs.
+/// A replay with checkpoints. A model that differs in one parameter is replayed only where the result can differ.
 #[derive(Clone, Debug, Default)]
 pub struct IncrementalReplay {
     pub(super) result: ReplayResult,
@@ -15,7 +15,7 @@ pub struct IncrementalReplay {
 }
 
 impl IncrementalReplay {
-    /// Replays a law and stores checkpoints.
+    /// Replays the model and stores checkpoints.
     #[must_use]
     pub fn new(
         model: &CompiledModel,
@@ -33,9 +33,9 @@ impl IncrementalReplay {
         replay
     }
 
-    /// The result of [`replay_with_ruptures`] for a similar model: the same effects and pieces, another base
-    /// parameter or rupture time. `was` is the model of this replay. The part before the first possible
-    /// difference and the part after both states agree again are reused.
+    /// The result of [`replay_with_ruptures`] for `now`, which has the same effects and pieces as the model `was` of this replay but
+    /// another base parameter or rupture time. Reuses the part before the first possible difference and the part after both states agree
+    /// again.
     #[must_use]
     pub fn replay_neighbour(
         &self,
@@ -54,7 +54,7 @@ impl IncrementalReplay {
         };
         out.ruptures.clone_from(&start.ruptures);
         let done_with = ruptures_until_equal(was, now);
-        // Before both rupture times have passed the states cannot agree again.
+        // The states can agree again only after both rupture times have passed.
         let moved = self.rupture_times_s.iter().zip(rupture_times).filter(|(a, b)| a != b);
         let passed_s = moved.map(|(a, b)| a.max(*b)).fold(f64::NEG_INFINITY, f64::max);
         let mut same: Option<(usize, usize)> = None;
@@ -62,7 +62,7 @@ impl IncrementalReplay {
         advance(now, blocks, pieces, rupture_times, start.clone(), &mut out, &mut |s| {
             let known = self.checkpoints.get(next);
             next += 1;
-            // The first visit is the start itself.
+            // The first visit is the start itself, where the states agree trivially.
             let passed = pieces.get(s.piece).is_some_and(|p| p.start_s > passed_s);
             if passed
                 && next > at + 1
@@ -83,7 +83,7 @@ impl IncrementalReplay {
         out
     }
 
-    /// First piece in which a difference can appear.
+    /// Index of the first piece whose prediction can differ.
     pub(super) fn first_difference(
         &self,
         was: &CompiledModel,
@@ -109,7 +109,7 @@ impl IncrementalReplay {
                     >= front
             };
             first = first.min(pieces.iter().position(reached).unwrap_or(pieces.len()));
-            // A layer is strained from the rupture of the previous one on.
+            // A layer is loaded from the rupture of the previous one on.
             if let Some(before) =
                 l.checked_sub(1).and_then(|k| self.rupture_times_s.get(k)).filter(|t| **t < NO_RUPTURE)
             {
@@ -120,8 +120,8 @@ impl IncrementalReplay {
     }
 }
 
-/// Number of ruptures after which two laws are equal: stiffness and puncture force of a ruptured layer no
-/// longer matter.
+/// Number of ruptures after which both models have the same force: stiffness and puncture force of a ruptured layer have no effect.
+/// `usize::MAX` if they differ to the end.
 pub(super) fn ruptures_until_equal(was: &CompiledModel, now: &CompiledModel) -> usize {
     let pairs = || was.law.slabs().iter().zip(now.law.slabs());
     let Some(last) = pairs().rposition(|(a, b)| a != b) else { return 0 };
@@ -130,11 +130,11 @@ pub(super) fn ruptures_until_equal(was: &CompiledModel, now: &CompiledModel) -> 
             || a.thickness_m != b.thickness_m
             || a.friction_ns_per_m2 != b.friction_ns_per_m2
             || a.replaced_friction_share != b.replaced_friction_share
-            // Tissue that sticks to the shaft is dragged by the layer's spring.
+            // Tissue that sticks to the shaft is loaded through the layer's stiffness.
             || (a.replaced_friction_share > 0.0 && a != b)
     });
     if lasting || !now.law.tip_follows_base() { usize::MAX } else { last + 1 }
 }
 
-/// Margin in m before the front of a layer within which it may already act.
+/// Margin (m) above the front of a layer within which it may already act, for the rounding of positions.
 const CONTACT_MARGIN_M: f64 = 1e-5;

@@ -1,9 +1,10 @@
-//! The forward model: the law replayed over the blocks of a recording with imposed rupture times.
+//! The forward model: force predicted by the tissue model and the measurement chain over the blocks of a recording, with imposed rupture
+//! times.
 //!
 //! | module | contents |
 //! |---|---|
-//! | `time_stepper` | law and measurement chain over spans of smooth motion, jumps and ruptures |
-//! | `checkpoint`, `incremental_replay` | a replay with saved states, from which similar models are replayed in part |
+//! | `time_stepper` | steps tissue model and measurement chain over spans of smooth motion, jumps and ruptures |
+//! | `checkpoint`, `incremental_replay` | stored states, from which a similar model is replayed in part |
 
 mod checkpoint;
 mod incremental_replay;
@@ -30,10 +31,10 @@ pub struct ReplayResult {
     pub ruptures: Vec<RuptureEvent>,
 }
 
-/// Pieces between two checkpoints.
+/// Motion pieces between two checkpoints: a compromise between memory and the part that is replayed again.
 const CHECKPOINT_PIECES: usize = 24;
 
-/// Replays a law with ruptures at `rupture_times` (s; [`NO_RUPTURE`] for layers that do not rupture).
+/// Replays a model with ruptures at `rupture_times` (s; [`NO_RUPTURE`] for layers that do not rupture) into `out`.
 pub fn replay_with_ruptures(
     model: &CompiledModel,
     blocks: &BlockAverages,
@@ -45,7 +46,7 @@ pub fn replay_with_ruptures(
     advance(model, blocks, pieces, rupture_times, first, out, &mut |_| true);
 }
 
-/// Prepares a replay and its initial state.
+/// Clears `out` and returns the initial state of a replay.
 fn initial_checkpoint(model: &CompiledModel, blocks: &BlockAverages, out: &mut ReplayResult) -> Checkpoint {
     out.force_n.clear();
     out.force_n.resize(blocks.len(), 0.0);
@@ -159,8 +160,8 @@ fn advance(
     }
 }
 
-/// First time in a piece, from `at_s` on, at which the tip reaches an unbroken break position, which is then
-/// marked as broken.
+/// First time (s) from `at_s` to the end of the piece at which the tip reaches an unbroken break position, which is then marked as broken;
+/// [`NO_RUPTURE`] if there is none.
 fn next_break(model: &CompiledModel, piece: &MotionPiece, at_s: f64, broken: &mut [bool]) -> f64 {
     let mut first = (NO_RUPTURE, usize::MAX);
     for (k, place) in model.break_positions_m.iter().enumerate().filter(|(k, _)| !broken[*k]) {
@@ -177,11 +178,11 @@ fn next_break(model: &CompiledModel, piece: &MotionPiece, at_s: f64, broken: &mu
     if first.1 < broken.len() {
         broken[first.1] = true;
     }
-    // Only a time inside the piece cuts it.
+    // A time at the end of the piece does not cut it.
     if first.0 < piece.end_s { first.0 } else { NO_RUPTURE }
 }
 
-/// Times (s) at which the tip reaches the break positions.
+/// Times (s) at which the tip reaches the break positions of the model.
 pub fn break_times(model: &CompiledModel, pieces: &[MotionPiece]) -> Vec<f64> {
     let mut broken = vec![false; model.break_positions_m.len()];
     let mut rupture_times = Vec::new();
@@ -198,7 +199,7 @@ pub fn break_times(model: &CompiledModel, pieces: &[MotionPiece]) -> Vec<f64> {
     rupture_times
 }
 
-/// Times (s) at which the law itself ruptures, as they appear in the recorded force.
+/// Times (s) at which the model ruptures by its own criterion, as they appear in the recorded force.
 pub fn free_rupture_times(model: &CompiledModel, pieces: &[MotionPiece]) -> Vec<f64> {
     let mut state = ForceLawState::default();
     let mut rupture_times = vec![NO_RUPTURE; model.puncture_n.len()];

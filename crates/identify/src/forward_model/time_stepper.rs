@@ -1,4 +1,4 @@
-//! Steps law and measurement chain along the motion.
+//! Steps tissue model and measurement chain along the motion.
 
 use crate::block_averages::BlockAverages;
 use crate::model::CompiledModel;
@@ -16,9 +16,9 @@ pub(super) struct TimeStepper<'a> {
     pub(super) sample_step_s: f64,
     /// Puncture force in N of the active layer in the previous span.
     pub(super) threshold_n: f64,
-    /// Until this time (s) a compliant needle or a lagging sensor is still in transient after a jump.
+    /// Until this time (s) a compliant needle or a lagging sensor is in transient after a jump.
     pub(super) transient_until_s: f64,
-    /// Sample times of the block, if they matter.
+    /// Sample times of the current block if jumps are low-pass filtered, else empty.
     pub(super) samples: BlockSamples<'a>,
 }
 
@@ -41,7 +41,7 @@ impl<'a> BlockSamples<'a> {
         from_s <= self.from_s && to_s >= self.to_s
     }
 
-    /// Share of the block per sample, in s.
+    /// Time (s) that one sample represents in its block.
     fn share_s(&self) -> f64 {
         (self.to_s - self.from_s) / self.time_s.len() as f64
     }
@@ -54,17 +54,16 @@ fn between(times: &[f64], from_s: f64, to_s: f64) -> &[f64] {
     &times[first..first + count]
 }
 
-/// Duration in s of the transient after a velocity jump or rupture, during which the force of a compliant
-/// needle or a lagging sensor is evaluated at every sample.
+/// Duration (s) of the transient after a velocity jump or rupture, in which a compliant needle or a lagging sensor is evaluated at every
+/// sample instead of once per piece.
 const TRANSIENT_S: f64 = 0.3;
-/// Neighbouring pieces whose velocities differ by less than this share belong to one motion; a velocity jump is
-/// larger.
+/// Relative velocity difference up to which neighbouring pieces belong to one motion; a velocity jump is larger.
 const SAME_MOTION_SHARE: f64 = 0.3;
-/// Relative change of the puncture threshold between spans that counts as a jump.
+/// Relative change of the puncture force between spans from which it counts as a jump.
 const THRESHOLD_JUMP_SHARE: f64 = 0.01;
 
 impl TimeStepper<'_> {
-    /// Law and measurement chain over a span of smooth motion: mean force times duration.
+    /// Integral of the force over a span of smooth motion, in N s.
     pub(super) fn force_integral(&mut self, piece: &MotionPiece, from_s: f64, to_s: f64) -> f64 {
         let fast = from_s < self.transient_until_s || !self.samples.covered_by(from_s, to_s);
         if fast && !self.samples.time_s.is_empty() {
@@ -86,7 +85,7 @@ impl TimeStepper<'_> {
         self.model.chain.mean_force(chain, &cell) * span_s
     }
 
-    /// The same for a span with a transient: sum over samples, each times its share of the block.
+    /// The same for a span in transient: sum over the samples, each times the time it represents.
     fn sampled_force_integral(&mut self, piece: &MotionPiece, from_s: f64, to_s: f64) -> f64 {
         let (mut at_s, mut sum) = (from_s, 0.0);
         let samples = self.samples;
@@ -98,9 +97,9 @@ impl TimeStepper<'_> {
         sum * samples.share_s()
     }
 
-    /// Law and measurement chain from one time to another: force at the latter.
+    /// Steps tissue model and measurement chain from one time to another; returns the force (N) at the latter.
     fn force_at_sample(&mut self, piece: &MotionPiece, from_s: f64, to_s: f64) -> f64 {
-        // A lag responds to the mean force.
+        // A first-order lag responds to the mean force over the interval.
         let lags = self.model.chain.has_lag();
         let total_n = self.law_force(piece, if lags { 0.5 * (from_s + to_s) } else { to_s });
         let Some(chain) = &mut self.chain else { return total_n };
@@ -116,7 +115,7 @@ impl TimeStepper<'_> {
         self.model.chain.force_at_end(chain, &cell)
     }
 
-    /// Law at a time of a piece: tissue force in N.
+    /// Tissue force in N at a time of a piece.
     fn law_force(&mut self, piece: &MotionPiece, at_s: f64) -> f64 {
         let (z, v) = piece.at(at_s);
         let (z, v) = (z * self.model.true_over_recorded, v * self.model.true_over_recorded);
@@ -130,8 +129,8 @@ impl TimeStepper<'_> {
         self.model.law.step_imposed(&mut self.state, at_s, z, v, self.ruptured_layers, record).total_n
     }
 
-    /// Crosses the border between two pieces: a compliant needle starts to follow another velocity, and
-    /// path-dependent friction reverses exactly there.
+    /// Crosses the border between two pieces. If the velocity jumps, the model is stepped exactly to the border, because a compliant needle
+    /// or path-dependent friction changes its branch there.
     pub(super) fn cross_piece_boundary(&mut self, before: &MotionPiece, next: &MotionPiece) {
         let jump_mps = (next.at(next.start_s).1 - before.at(before.end_s).1).abs();
         if jump_mps <= MIN_JUMP_MPS {
@@ -177,7 +176,7 @@ impl TimeStepper<'_> {
             law.step_imposed(&mut { state }, at_s, z, v_mps, layer, |s| then = s.puncture_n);
             then
         };
-        // A threshold that jumped with the velocity passed the force on the way.
+        // If the puncture force jumps with the velocity past the elastic force, the rupture is exactly at the threshold.
         if let (Some(s), Some(event)) = (strained, self.ruptures.get_mut(layer))
             && s.puncture_n.is_finite()
         {
@@ -187,7 +186,7 @@ impl TimeStepper<'_> {
             } else if let Some(next) =
                 after.filter(|_| event.force_excess < 0.0 && piece.end_s - at_s < self.sample_step_s)
             {
-                // The velocity, and with it the threshold, jumps within a sampling interval.
+                // The velocity, and with it the puncture force, jumps within a sampling interval.
                 let then = threshold_n(next.velocity_mps * self.model.true_over_recorded);
                 if jumped(then, s.puncture_n) && s.elastic_n > then {
                     event.force_excess = 0.0;
@@ -202,14 +201,14 @@ impl TimeStepper<'_> {
             event.elastic_n = s.elastic_n;
             event.depth_rate_mps = tip_v.max(0.0);
             let stiffness = self.model.stiffness_n_per_m.get(layer).copied().unwrap_or(0.0);
-            // The rate of the force minus that of the threshold.
+            // Rate of the elastic force minus rate of the puncture force.
             event.force_excess_rate = if s.puncture_n.is_finite() {
                 let ahead_s = self.sample_step_s;
                 let (now, then) = (
                     threshold_n(v),
                     threshold_n(v + acceleration_mps2 * self.model.true_over_recorded * ahead_s),
                 );
-                // An undefined threshold carries no information.
+                // An infinite puncture force gives no information about the rate.
                 let threshold_fall = Some((now - then) / ahead_s).filter(|f| f.is_finite()).unwrap_or(0.0);
                 (stiffness * tip_v.max(0.0) + threshold_fall).max(0.0) / s.puncture_n
             } else {
@@ -218,7 +217,7 @@ impl TimeStepper<'_> {
         }
         self.ruptured_layers += 1;
         self.mark_jump(at_s);
-        // State just after: the released force.
+        // Strain of the deeper layers just after the release.
         let after = &mut self.ruptures[..];
         self.model.law.step_imposed(&mut self.state, at_s, z, v, self.ruptured_layers, |s| {
             if s.layer > layer + 1 {
@@ -228,7 +227,7 @@ impl TimeStepper<'_> {
     }
 }
 
-/// Acceleration of the base around a piece from its neighbours of similar velocity.
+/// Acceleration (m/s²) of the base around a piece, from the velocities of neighbouring pieces of the same motion.
 pub(super) fn local_acceleration_mps2(pieces: &[MotionPiece], index: usize) -> f64 {
     let Some(here) = pieces.get(index) else { return 0.0 };
     let same_motion = |p: &&MotionPiece| {
@@ -245,7 +244,7 @@ pub(super) fn local_acceleration_mps2(pieces: &[MotionPiece], index: usize) -> f
     }
 }
 
-/// Keeps the largest strain of every layer while it is active.
+/// Updates the largest strain of a layer while it is active.
 pub(super) fn record_strain(ruptures: &mut [RuptureEvent], s: &RuptureCriterion) {
     let Some(event) = ruptures.get_mut(s.layer - 1) else { return };
     if s.puncture_n.is_finite() && s.puncture_n > 0.0 {

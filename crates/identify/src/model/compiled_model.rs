@@ -3,7 +3,7 @@ use stylet_tissue::{ChainStage, Effect, ForceLaw, MeasurementChain};
 
 /// A model ready to be replayed over one recording.
 pub struct CompiledModel {
-    /// The law.
+    /// The tissue model.
     pub law: ForceLaw,
     /// The measurement chain.
     pub chain: MeasurementChain,
@@ -13,20 +13,20 @@ pub struct CompiledModel {
     pub true_over_recorded: f64,
     /// Delay of the force in s.
     pub delay_s: f64,
-    /// A velocity jump is low-pass filtered before it is sampled.
+    /// Whether velocity jumps are low-pass filtered before sampling, by a lagging sensor or a compliant needle.
     pub smears_jumps: bool,
     /// As in [`Model::jump_delay_s`].
     pub jump_delay_s: Option<f64>,
-    /// Positions (m) at which a tip force may jump: interfaces, and break depths of effects.
+    /// Positions (m) at which the force may jump: interfaces if an effect acts at the tip, and break depths of effects.
     pub break_positions_m: Vec<f64>,
-    /// Puncture force of every layer in N; infinite when the layer ruptures at its far interface only.
+    /// Puncture force of every layer in N; infinite for a layer that ruptures only at its far interface.
     pub puncture_n: Vec<f64>,
     /// Stiffness of every layer in N/m.
     pub stiffness_n_per_m: Vec<f64>,
 }
 
 impl Model {
-    /// Law and measurement chain of a recording; `None` when the values are invalid.
+    /// Tissue model and measurement chain of a recording; `None` when the parameter values are invalid.
     #[must_use]
     pub fn compile(&self, recording: usize) -> Option<CompiledModel> {
         let mut effects = self.assumed.known_effects.clone();
@@ -76,7 +76,7 @@ impl Model {
         })
     }
 
-    /// Whether some effect acts along the shaft.
+    /// Whether an effect acts on the friction along the shaft.
     #[must_use]
     pub fn has_friction_effects(&self) -> bool {
         self.effects

@@ -16,7 +16,7 @@ impl EffectTerm {
         Self { info, values: values.to_vec() }
     }
 
-    /// The effect in the form that the law takes; `None` when the values are invalid.
+    /// The effect as the tissue model takes it; `None` when the values are invalid.
     #[must_use]
     pub fn effect(&self) -> Option<AnyEffect> {
         self.info.with_parameters(&self.values)

@@ -1,11 +1,11 @@
-/// Which parameters are free besides `K, b, F` and those of effects.
+/// Which parameters are free in addition to `K, b, F` and effect parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FreeParameters {
     /// Position of the surface.
     pub surface: bool,
     /// Layer thicknesses.
     pub thickness: bool,
-    /// Thickness bounds are widened beyond the assumed tolerances.
+    /// Use of the wide thickness bounds ([`MAX_TOLERANCES_WIDE`](super::MAX_TOLERANCES_WIDE)).
     pub wide_thickness: bool,
     /// Surface offset per recording.
     pub recording_surface: bool,

@@ -4,9 +4,9 @@
 //! |---|---|
 //! | `assumptions`, `effect_term` | assumed tissue with tolerances; an effect with its parameter values |
 //! | `free_parameters`, `random_effects` | which parameters are free; parameters of recordings and days and their scatter |
-//! | `parameter`, `parameter_bounds`, `parameter_values` | what a parameter stands for; bounds and prior; its value |
-//! | `zero_steps`, `sensor_zero` | steps of the sensor's zero in each recording |
-//! | `compiled_model` | law and measurement chain of one recording |
+//! | `parameter`, `parameter_bounds`, `parameter_values` | role of a parameter; bounds and prior; its value |
+//! | `zero_steps`, `sensor_zero` | steps of the sensor zero in each recording |
+//! | `compiled_model` | tissue model and measurement chain of one recording |
 
 mod assumptions;
 mod compiled_model;
@@ -51,22 +51,22 @@ pub struct Model {
     pub free: FreeParameters,
     /// Parameters of each recording.
     pub per_recording: Vec<RecordingParameters>,
-    /// Scatter between recordings.
+    /// Standard deviations between recordings.
     pub scatter: Scatter,
     /// Times (s) at which the recorded force shows the rupture of each layer, per recording.
     pub rupture_times_s: Vec<Vec<f64>>,
-    /// Steps of the sensor's zero, per recording in order of time; their sizes are fitted.
+    /// Steps of the sensor zero, per recording in order of time; their sizes are fitted.
     pub zero_steps: Vec<Vec<ZeroStep>>,
-    /// Effect parameters that are not fitted by themselves.
+    /// Effect parameters that are constant or equal to another parameter.
     pub tied: Vec<TiedParameter>,
     /// Day of each recording; empty when days are not modelled.
     pub day_of: Vec<usize>,
     /// Parameters of each day.
     pub days: Vec<DayParameters>,
-    /// Standard deviations of random effects are given by the caller and not updated by a fit.
+    /// Whether the standard deviations of random effects are given by the caller instead of updated by a fit.
     pub fixed_scatter: bool,
-    /// Delay in s that fixes between which samples the jumps of a delayed force lie; `None`: at their true
-    /// times. The likelihood is a step function of this delay, so a search starts without it.
+    /// Delay (s) that determines between which samples the jumps of a delayed force lie; `None` places them at their exact times. The
+    /// likelihood is piecewise constant in this delay, so fits start without it ([`crate::delay_refinement`]).
     pub jump_delay_s: Option<f64>,
 }
 
@@ -92,7 +92,7 @@ impl Model {
         }
     }
 
-    /// The model of some of the recordings; days are kept.
+    /// The model restricted to some of the recordings; all days are kept.
     #[must_use]
     pub fn subset(&self, which: &[usize]) -> Self {
         let mut model = self.clone();
@@ -106,7 +106,7 @@ impl Model {
         model
     }
 
-    /// Effect parameters that vary between recordings: (effect, parameter) indices.
+    /// Indices (effect, parameter) of effect parameters that vary between recordings.
     pub fn varying_parameters(&self) -> impl Iterator<Item = (usize, usize)> {
         let all = self.effects.iter().enumerate().flat_map(|(effect, term)| {
             let varying =
@@ -149,7 +149,7 @@ impl Model {
         self.tissue.layers.len()
     }
 
-    /// Number of fitted parameters of all effects, and of time and size of all steps of the zero.
+    /// Number of parameters added to the base model: fitted effect parameters, and time and size of each step of the sensor zero.
     #[must_use]
     pub fn effect_parameter_count(&self) -> usize {
         let of_effect = |e: &EffectTerm| e.info.parameters.iter().filter(|p| !p.integer).count();

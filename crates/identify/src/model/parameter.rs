@@ -1,4 +1,4 @@
-/// What a parameter stands for.
+/// The quantity that a parameter represents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterRole {
     /// Stiffness of a layer (0-based), relative to the assumed one.
@@ -29,7 +29,7 @@ pub enum ParameterRole {
     DaySurface(usize),
     /// Log friction factor of a day.
     DayFriction(usize),
-    /// Size of a step of the sensor's zero (0-based) in each recording, in N.
+    /// Size of a step of the sensor zero (0-based) in each recording, in N.
     ZeroStep(usize),
     /// Rupture time of a layer (0-based) in each recording, in s.
     RuptureTime(usize),
@@ -53,7 +53,7 @@ impl ParameterRole {
 /// A free parameter of a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter {
-    /// What it stands for.
+    /// The quantity.
     pub role: ParameterRole,
     /// Lower bound.
     pub low: f64,

@@ -5,12 +5,12 @@ use stylet_tissue::{FitScale, Proposal};
 
 /// Lower bound of stiffness, friction and puncture force, as a share of the assumed value.
 const MIN_SHARE_OF_ASSUMED: f64 = 0.02;
-/// Bounds of surface and thicknesses, in tolerances.
+/// Half width of the bounds of surface and thicknesses, in tolerances.
 const MAX_TOLERANCES: f64 = 2.0;
-/// Bounds of thicknesses with [`FreeParameters::wide_thickness`](super::FreeParameters), in tolerances.
+/// Half width of the bounds of thicknesses with [`FreeParameters::wide_thickness`](super::FreeParameters), in tolerances.
 pub const MAX_TOLERANCES_WIDE: f64 = 5.0;
 
-/// Finite difference in N for the size of a step of the zero, in which the force is linear.
+/// Finite difference (N) for the size of a step of the sensor zero, in which the force is linear.
 const ZERO_STEP_DIFFERENCE_N: f64 = 1e-3;
 
 impl Model {
@@ -74,7 +74,7 @@ impl Model {
                 let (low, high, step) = match p.fit_scale() {
                     FitScale::Log => {
                         let (low, high) = ((from / 10.0).max(p.low), (to * 10.0).min(p.high));
-                        // Frequencies are determined by the phase at the end of a recording.
+                        // The phase at the end of a recording limits the step of a frequency.
                         let step = if p.unit == "Hz" { 1e-6 / at[parameter].max(1e-3) } else { 1e-4 };
                         (libm::log(low.max(1e-12)), libm::log(high), step)
                     }
@@ -83,7 +83,7 @@ impl Model {
                         let wide = to - from;
                         let low = if p.low == 0.0 { 0.0 } else { (from - wide).max(p.low) };
                         let high = (to + 3.0 * wide).min(p.high);
-                        // A parameter that moves an interface needs as fine a step as the interfaces have.
+                        // A parameter that moves an interface needs the same step as the interfaces.
                         let fine = 1e-4 * p.start.abs().max(at[parameter].abs()).max(1e-4);
                         let bends = p.unit == "m" && term.info.proposal == Proposal::MembraneRupture;
                         (low, high, if bends { 1e-7 } else { fine })
@@ -108,14 +108,14 @@ impl Model {
         out
     }
 
-    /// Standard deviation of the `k`-th varying parameter between recordings.
+    /// Standard deviation of the `k`-th varying parameter between recordings: the estimate, or the library's value without one.
     #[must_use]
     pub fn varying_sd(&self, k: usize) -> f64 {
         let known = self.scatter.varying.get(k).copied().unwrap_or(0.0);
         if known > 0.0 { known } else { self.library_varying_sd(k) }
     }
 
-    /// The same as given by the effect library.
+    /// The library's value of this standard deviation.
     #[must_use]
     pub fn library_varying_sd(&self, k: usize) -> f64 {
         self.varying_parameters()

@@ -1,6 +1,6 @@
-//! Random effects: parameters of recordings and days, and their scatter.
+//! Random effects: parameters of recordings and days, and their standard deviations.
 
-/// Largest number of varying effect parameters in one model.
+/// Largest number of varying effect parameters in one model: the length of the fixed arrays below.
 pub const MAX_VARYING_PARAMETERS: usize = 8;
 
 /// Parameters of one recording.
@@ -24,7 +24,7 @@ pub struct DayParameters {
     pub ln_friction: f64,
 }
 
-/// An effect parameter that is not fitted by itself.
+/// An effect parameter that is constant or equal to another parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TiedParameter {
     /// Index of the effect in the model.
@@ -35,7 +35,7 @@ pub struct TiedParameter {
     pub tied_to: Option<usize>,
 }
 
-/// Standard deviations between recordings and days, estimated with each model.
+/// Standard deviations between recordings and between days, estimated with each model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scatter {
     /// Relative standard deviation of the force at rupture.

@@ -1,4 +1,4 @@
-//! Steps of the sensor's zero: a piecewise constant offset of each recording.
+//! Steps of the sensor zero: a piecewise constant offset of the force of each recording.
 
 /// A step of the zero in one recording.
 #[derive(Clone, Copy, Debug, PartialEq)]

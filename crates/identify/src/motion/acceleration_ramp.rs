@@ -1,16 +1,15 @@
-//! Finite acceleration where a velocity jump was commanded.
+//! Finite acceleration of the drive at a commanded velocity jump.
 //!
-//! Where two segments of constant velocity meet, the position of a drive with constant acceleration deviates
-//! from both lines by
-//! `dv (a/2 - |t - t0|)^2 / (2 a)`, with duration `a` and intersection time `t0`. Under encoder noise this is the only visible trace; a force
-//! compared with an instantaneous jump would appear to have a lag or inertia.
+//! Where two segments of constant velocity meet, a drive with constant acceleration deviates from both lines by
+//! `dv (a/2 - |t - t0|)^2 / (2 a)`, with duration `a` and intersection time `t0`. If the jump were modelled as instantaneous, the force
+//! would appear to have a lag or inertia.
 
 use super::smooth_interval::{Cells, SmoothInterval};
 use super::velocity_estimate::VelocityJump;
 
-/// Longest ramp in s.
+/// Longest ramp (s): slower changes are fitted as segments of their own.
 const MAX_DURATION_S: f64 = 0.6;
-/// Smallest improvement in nats: one more parameter, and a search over it.
+/// Smallest improvement (nats) for one more parameter and the search over it.
 const MIN_GAIN_NATS: f64 = 8.0;
 
 /// A constant acceleration between two velocities.
@@ -23,7 +22,7 @@ pub(super) struct AccelerationRamp {
 }
 
 impl AccelerationRamp {
-    /// The ramp between two constant-velocity segments that meet at a jump, if the positions show one.
+    /// Best ramp between two constant-velocity segments that meet at a jump; `None` if it improves the fit too little.
     pub fn between(
         left: &SmoothInterval,
         right: &SmoothInterval,
@@ -45,7 +44,7 @@ impl AccelerationRamp {
         let reach = (0.5 * MAX_DURATION_S / cells.dt) as usize + 1;
         let at = cells.t.partition_point(|t| *t < jump.time_s);
         let around = at.saturating_sub(reach).max(left.from)..(at + reach).min(right.to);
-        // Half of a shorter neighbour belongs to its other border.
+        // The other half of a short neighbour belongs to its other border.
         let longest = MAX_DURATION_S.min(cells.dt * (left.to - left.from).min(right.to - right.from) as f64);
         let off = |lasts_s: f64| -> f64 {
             let ramp = of(lasts_s);
@@ -64,7 +63,7 @@ impl AccelerationRamp {
         if inside > 0.0 { even + (after - before) * inside * inside / (2.0 * self.duration_s) } else { even }
     }
 
-    /// Position (m) and velocity (m/s) at a time within the ramp.
+    /// Position (m) and velocity (m/s) at a time; `None` outside the ramp.
     pub fn at(&self, t: f64) -> Option<(f64, f64)> {
         let share = (t - self.mid_s) / self.duration_s + 0.5;
         let [before, after] = self.velocity_mps;

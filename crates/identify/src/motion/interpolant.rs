@@ -1,8 +1,8 @@
-//! Position and velocity between samples, and their integrals.
+//! Position and velocity between samples, with their integrals over time.
 
 use super::jump_timing::JumpTiming;
 
-/// Position and velocity between knots.
+/// Interpolates position and velocity between knots.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Interpolant {
     /// Time in s, non-decreasing; repeated at a velocity jump.
@@ -15,8 +15,8 @@ pub(super) struct Interpolant {
     sum_z: Vec<f64>,
     /// Integral of the velocity in m up to each knot.
     sum_v: Vec<f64>,
-    /// Whether positions and velocities are precise enough for a cubic between knots; the integral of the velocity then is the difference of
-    /// positions. Otherwise both are linear, so that position noise does not enter the mean velocity.
+    /// Whether positions are precise enough for a cubic Hermite interpolation, whose velocity integrates to the position difference.
+    /// Otherwise both are linear, so that position noise does not enter the mean velocity.
     cubic: bool,
 }
 
@@ -53,7 +53,7 @@ impl Interpolant {
         self.t.partition_point(|t| *t <= at_s).saturating_sub(1)
     }
 
-    /// [`integrals`](Self::integrals), with the velocity on one side of a jump continued beyond it.
+    /// [`integrals`](Self::integrals) with the motion on one side of a jump extrapolated beyond the jump.
     pub(super) fn integrals_beyond_jump(
         &self,
         jump: &JumpTiming,
@@ -85,7 +85,7 @@ impl Interpolant {
         let share = dt / step;
         let mix = |x: &[f64]| x[k] + 0.5 * share * (x[k + 1] - x[k]);
         let travel = if self.cubic {
-            // Hermite's cubic from positions and velocities at both knots.
+            // Cubic Hermite interpolation of positions and velocities at both knots.
             let (v0, v1, mean) = (self.v[k], self.v[k + 1], (self.z[k + 1] - self.z[k]) / step);
             dt * (v0 + share * (3.0 * mean - 2.0 * v0 - v1 + share * (v0 + v1 - 2.0 * mean)))
         } else {

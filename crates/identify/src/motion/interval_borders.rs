@@ -1,14 +1,14 @@
-//! Borders between the intervals of a motion: merging, splitting, refitting.
+//! Borders between the intervals of a motion: merges, splits and refits neighbouring intervals.
 
 use super::motion_segment::{MIN_CELLS, MotionSegment};
 use super::smooth_interval::{Cells, SmoothInterval};
 
-/// Placeholder frequency (1/s) for the union of intervals without any: too low to matter.
+/// Placeholder frequency (1/s) for a union of intervals without frequencies: too low to change the fit.
 const NO_FREQUENCY_HINT: f64 = 1e-3;
-/// Cells within which a jump is moved to the intersection of both sides.
+/// Distance (cells) by which a border may move to the intersection of both segments.
 const JUMP_REACH_CELLS: usize = 25;
 
-/// Merges neighbours that are one segment together: a fast ripple looks like a chain of jumps.
+/// Merges neighbours that a single segment fits at lower cost: a fast ripple is first detected as a chain of jumps.
 pub(super) fn merge_neighbours(cells: &Cells, mut intervals: Vec<SmoothInterval>) -> Vec<SmoothInterval> {
     loop {
         let before = intervals.len();
@@ -32,8 +32,8 @@ pub(super) fn merge_neighbours(cells: &Cells, mut intervals: Vec<SmoothInterval>
     }
 }
 
-/// Splits an interval without a segment where its beginning ceases to be one: a small velocity jump is not
-/// visible in a short window.
+/// Splits an interval without a segment at the end of its longest beginning that has one: a small velocity jump is not significant in a
+/// short window.
 pub(super) fn split_unfitted(cells: &Cells, intervals: Vec<SmoothInterval>) -> Vec<SmoothInterval> {
     let mut out = Vec::new();
     let mut todo: Vec<SmoothInterval> = intervals.into_iter().rev().collect();
@@ -49,7 +49,7 @@ pub(super) fn split_unfitted(cells: &Cells, intervals: Vec<SmoothInterval>) -> V
             let middle = usize::midpoint(good, bad);
             if part(middle).segment.is_some() { good = middle } else { bad = middle }
         }
-        // A segment extends beyond its true end before noise shows the misfit, and bends on the way.
+        // A segment can bend beyond its true end before the misfit is significant, so the border is searched again.
         let until = |beyond: usize| (good + beyond).min(to);
         let within = (from + MIN_CELLS, good.min(to - MIN_CELLS));
         let end = [2 * JUMP_REACH_CELLS, 2 * MIN_CELLS]
@@ -65,8 +65,7 @@ pub(super) fn split_unfitted(cells: &Cells, intervals: Vec<SmoothInterval>) -> V
     out
 }
 
-/// The border between `low` and `high` with the lowest total cost on both sides; `None` where they are never
-/// two segments.
+/// Border between `low` and `high` with the lowest total cost of both sides; `None` if no border gives two segments.
 fn best_border(cells: &Cells, (from, to): (usize, usize), (low, high): (usize, usize)) -> Option<usize> {
     let cost = |at: usize| {
         SmoothInterval::new(cells, (from, at), &[]).cost + SmoothInterval::new(cells, (at, to), &[]).cost
@@ -89,8 +88,8 @@ fn best_border(cells: &Cells, (from, to): (usize, usize), (low, high): (usize, u
     }
 }
 
-/// Moves borders next to curved or missing segments to the lowest total cost: a jump found a few tenths of a
-/// second early or late leaves an end of one segment in the other.
+/// Moves borders next to curved or missing segments to the lowest total cost: a border that is a few tenths of a second off assigns the end
+/// of one segment to the other.
 pub(super) fn refit_borders(cells: &Cells, mut intervals: Vec<SmoothInterval>) -> Vec<SmoothInterval> {
     for k in 1..intervals.len() {
         let (left, right) = (&intervals[k - 1], &intervals[k]);
@@ -115,7 +114,7 @@ pub(super) fn refit_borders(cells: &Cells, mut intervals: Vec<SmoothInterval>) -
     intervals
 }
 
-/// Moves borders to the intersections of both segments.
+/// Moves borders to the intersections of neighbouring segments.
 pub(super) fn move_borders_to_intersections(
     cells: &Cells,
     mut intervals: Vec<SmoothInterval>,
@@ -140,8 +139,8 @@ pub(super) fn move_borders_to_intersections(
     intervals
 }
 
-/// Time near their border at which two segments intersect; of several intersections (a ripple crosses a line
-/// repeatedly) the one with the smallest misfit of the surrounding cells.
+/// Time (s) near their border at which two segments intersect. A ripple can cross a line repeatedly; the intersection with the smallest
+/// misfit of the surrounding cells is chosen.
 pub(super) fn intersection_time(left: &SmoothInterval, right: &SmoothInterval, cells: &Cells) -> Option<f64> {
     let (Some(a), Some(b)) = (&left.segment, &right.segment) else { return None };
     let near = cells.t[right.from] - 0.5 * cells.dt;

@@ -1,11 +1,11 @@
 //! Times of velocity jumps.
 
-/// A velocity jump with its time.
+/// Time, position and velocities of a velocity jump.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JumpTiming {
     /// Time in s.
     pub time_s: f64,
-    /// Midpoint of the samples before and after it, in s.
+    /// Midpoint (s) of the samples before and after the jump.
     pub sample_mid_s: f64,
     /// Standard deviation of the time in s.
     pub time_sd_s: f64,

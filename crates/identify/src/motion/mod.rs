@@ -1,11 +1,10 @@
-//! Motion of the needle base as a function of time: position and velocity between samples, velocity jumps at
-//! their times, means over any span.
+//! Motion of the needle base as a function of time: position and velocity between samples, times of velocity jumps, means over any span.
 //!
 //! | module | contents |
 //! |---|---|
 //! | `velocity_estimate` | velocity and its jumps from exact positions |
 //! | `smooth_positions` | the same from noisy positions |
-//! | `smooth_interval`, `interval_borders` | intervals between velocity jumps, and where they begin and end |
+//! | `smooth_interval`, `interval_borders` | intervals between velocity jumps, and their borders |
 //! | `motion_segment`, `acceleration_ramp` | parametric segments of commanded motion, and transitions between them |
 //! | `jump_timing`, `interpolant` | times of velocity jumps; position and velocity between samples |
 //! | `motion_pieces` | means over spans, cut at velocity jumps and reversals |
@@ -34,12 +33,11 @@ use velocity_estimate::position_noise;
 pub struct Motion {
     /// Interpolant with jumps at their exact times.
     exact: Interpolant,
-    /// Interpolant with jumps midway between two samples, as a mean over samples sees them.
+    /// Interpolant with jumps midway between two samples, which gives the mean over samples.
     sampled: Interpolant,
     /// Velocity jumps.
     pub jumps: Vec<JumpTiming>,
-    /// Times in s at which the velocity smoothly changes sign, and the midpoints of the samples around them:
-    /// Coulomb friction jumps there.
+    /// Times (s) at which the velocity smoothly changes sign, and the midpoints of the samples around them; Coulomb friction jumps there.
     reversals_s: Vec<(f64, f64)>,
     /// Standard deviation of the velocity in m/s.
     pub velocity_sd_mps: f64,
@@ -47,12 +45,11 @@ pub struct Motion {
     pub noise_m: f64,
 }
 
-/// Velocity noise in m/s above which positions are smoothed.
+/// Velocity noise (m/s) above which positions are smoothed.
 const MAX_EXACT_SD_MPS: f64 = 1.2e-5;
 
 impl Motion {
-    /// Motion of a recording whose samples are all finite. Below `still_mps` (m/s) the needle counts as at
-    /// rest.
+    /// Motion of a recording with finite samples. Below `still_mps` (m/s) the needle is at rest.
     #[must_use]
     pub fn from_recording(recording: &Recording, still_mps: f64) -> Self {
         let (t, z) = (&recording.time_s, &recording.position_m);
@@ -119,14 +116,14 @@ impl Motion {
             m.exact.push(t[i], z[i], v[i]);
             m.sampled.push(t[i], z[i], v[i]);
         }
-        // Noisy positions do not distinguish a reversal from a hold.
+        // Noise would turn a hold into reversals.
         if sd <= MAX_EXACT_SD_MPS {
             m.find_reversals(t, still_mps);
         }
         m
     }
 
-    /// Finds sign changes of the velocity between two samples without a jump.
+    /// Finds sign changes of the velocity between two samples that are not at a jump.
     fn find_reversals(&mut self, t: &[f64], still_mps: f64) {
         let sign = |v: f64| i8::from(v > still_mps) - i8::from(v < -still_mps);
         let mut near = 0;

@@ -2,12 +2,12 @@
 
 use super::Motion;
 
-/// Where velocity jumps appear in the force.
+/// Where the velocity jumps of the motion appear in the force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JumpAppearance {
     /// In a force without delay: between the samples before and after the jump.
     BetweenSamples,
-    /// In a force delayed by this many s, or low-pass filtered: at the exact times.
+    /// In a force with this delay (s), or a low-pass filtered force: at the exact times plus the delay.
     Delayed(f64),
     /// In a delayed force without low-pass filter: between samples.
     DelayedBetweenSamples {
@@ -18,7 +18,7 @@ pub enum JumpAppearance {
     },
 }
 
-/// A time span with smooth motion, represented by its means.
+/// A time span with smooth motion: means and acceleration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionPiece {
     /// Index of the block it belongs to.
@@ -45,8 +45,8 @@ impl MotionPiece {
 }
 
 impl Motion {
-    /// Cuts consecutive spans `(start, end)` in s at velocity jumps and returns the mean motion of every piece.
-    /// `between` gives the midpoint of the samples around a time.
+    /// Cuts consecutive spans `(start, end)` in s at velocity jumps and reversals, and returns the mean motion of every piece. `between`
+    /// gives the midpoint of the samples around a time.
     #[must_use]
     pub fn pieces(
         &self,
@@ -84,8 +84,7 @@ impl Motion {
                 }
                 let cut = |next: Option<&f64>| next.copied().filter(|j| *j < to - 1e-6 * whole).unwrap_or(to);
                 let end = cut(jumps.get(jump)).min(cut(reversals.get(reversal)));
-                // A jump placed between samples: on either side the motion continues with the velocity of that
-                // side.
+                // The jump is placed between samples, so the motion on either side is extrapolated up to there.
                 let (before, next) = match appearance {
                     JumpAppearance::DelayedBetweenSamples { .. } => {
                         (jump.checked_sub(1).and_then(|k| self.jumps.get(k)), self.jumps.get(jump))
@@ -101,7 +100,7 @@ impl Motion {
                     }
                     _ => interpolant.integrals(at_s, &mut near),
                 };
-                // Slope of the velocity from the means over both halves.
+                // Acceleration from the mean velocities of both halves.
                 let (z0, v0) = sums(at - delay);
                 let (_, vm) = sums(0.5 * (at + end) - delay);
                 let (z1, v1) = sums(end - delay);

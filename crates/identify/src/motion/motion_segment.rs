@@ -1,24 +1,23 @@
-//! Parametric segments of commanded motion: a rest, a line, a parabola or cubic, a line with one or two
-//! sinusoids.
+//! Fits parametric segments of commanded motion: a rest, a line, a parabola or cubic, a line with one or two sinusoids.
 //!
-//! A local window narrow enough for a ripple of 1 Hz leaves 0.1 mm/s of encoder noise in the velocity, which
-//! friction turns into the largest force error. When a whole interval has one of these forms, a few parameters
-//! are estimated from all its samples and the velocity is a hundred times more accurate. An interval with
-//! coloured residuals under every form is left to local windows (`smooth_positions`).
+//! A local window narrow enough for a ripple of 1 Hz leaves 0.1 mm/s of encoder noise in the velocity, which friction turns into the
+//! largest force error. A parametric segment estimates a few parameters from all samples of an interval, and its velocity is a hundred
+//! times more accurate. Intervals whose residuals are not white under any form are smoothed by local windows (`smooth_positions`).
 
 use core::f64::consts::{PI, TAU};
 use stylet_stats::linear_algebra::SymmetricMatrix;
 
-/// Highest frequency in Hz that is searched.
+/// Highest frequency (Hz) that is searched; faster motion is left to local windows.
 const HIGHEST_HZ: f64 = 3.0;
 /// Length in s of the means used in the frequency search.
 const SEARCH_MEAN_S: f64 = 0.1;
-/// Smallest and largest number of these means.
+/// Smallest number of means in the frequency search.
 const MIN_SEARCH_MEANS: f64 = 24.0;
+/// Largest number of means in the frequency search, which bounds its cost.
 const MAX_SEARCH_MEANS: f64 = 400.0;
-/// Intervals shorter than this in s are searched over all frequencies, with or without hints.
+/// Intervals shorter than this (s) are searched over all frequencies even if hints are given.
 const SHORT_SEGMENT_S: f64 = 6.0;
-/// Cells per mean in the whiteness test.
+/// Cells per mean in the whiteness test: the variance of means shows low-frequency misfit.
 const WHITENESS_CELLS: usize = 8;
 /// Largest number of coefficients: a line and two sinusoids.
 const MAX_COEFFICIENTS: usize = 6;
@@ -36,9 +35,9 @@ pub(super) struct MotionSegment {
     sinusoids: Vec<[f64; 3]>,
     /// Standard deviation of the residual per cell in m.
     pub sd_m: f64,
-    /// Nats of residuals and parameters.
+    /// Bayesian information criterion in nats: negative log likelihood plus `ln n` per parameter.
     pub cost: f64,
-    /// Whether the residual is white.
+    /// Whether the residuals pass the whiteness test.
     pub white: bool,
 }
 
@@ -67,7 +66,7 @@ impl MotionSegment {
         self.sinusoids.is_empty() && self.poly[2..].iter().all(|c| *c == 0.0)
     }
 
-    /// Whether all amplitudes exceed `amplitude_m`.
+    /// Whether the amplitudes of all sinusoids exceed `amplitude_m`.
     fn sinusoids_exceed(&self, amplitude_m: f64) -> bool {
         self.sinusoids.iter().all(|[_, x, y]| libm::hypot(*x, *y) > amplitude_m)
     }
@@ -77,10 +76,10 @@ impl MotionSegment {
         self.sinusoids.iter().map(|w| w[0])
     }
 
-    /// The best segment for cells at `t` (s, midpoints, `cell_s` apart) with mean positions `z` (m). A long
-    /// interval is tried only with the angular frequencies in `hints` (1/s), if there are any. A sinusoid
-    /// smaller than `rounded_m` may be an artefact of quantisation at constant velocity, which beats with the
-    /// sampling; it is discarded, and the line counts as white if nothing else remains.
+    /// Segment with the lowest cost for cells with midpoints `t` (s, `cell_s` apart) and mean positions `z` (m). With angular frequencies
+    /// in `hints` (1/s), a long interval is tried at these frequencies only. Quantisation of a constant velocity beats with the sampling
+    /// and looks like a sinusoid: sinusoids with amplitudes below `rounded_m` are discarded, and a line with such residuals counts as
+    /// white.
     pub fn fit_best(t: &[f64], z: &[f64], cell_s: f64, hints: &[f64], rounded_m: f64) -> Option<Self> {
         let n = t.len();
         if n < MIN_CELLS {
@@ -91,7 +90,7 @@ impl MotionSegment {
         for degree in 1..=3 {
             best = cheaper(best, frame.fit(degree, &[]));
         }
-        // A union of intervals may be a sinusoid although, being short, it resembles a cubic.
+        // A short union of intervals can resemble a cubic although it is a sinusoid.
         let union = !hints.is_empty();
         if !best.white || union {
             let narrow = 0.3 / (2.0 * frame.half);
@@ -114,14 +113,14 @@ impl MotionSegment {
         Some(best)
     }
 
-    /// The better of a rest and a line.
+    /// The cheaper of a rest and a line.
     pub fn fit_constant_velocity(t: &[f64], z: &[f64], cell_s: f64) -> Option<Self> {
         let frame = SegmentFit::new(t, z, cell_s)?;
         Some(cheaper(frame.fit(0, &[])?, frame.fit(1, &[])))
     }
 }
 
-/// The cheaper of two.
+/// The segment with the lower cost.
 pub(super) fn cheaper(a: MotionSegment, b: Option<MotionSegment>) -> MotionSegment {
     match b {
         Some(b) if b.cost < a.cost => b,
@@ -181,7 +180,7 @@ impl<'a> SegmentFit<'a> {
         Some(segment)
     }
 
-    /// Row of the design matrix, as means over a cell.
+    /// Row of the design matrix: the regressors averaged over a cell.
     fn design_row(
         &self,
         row: &mut [f64; MAX_COEFFICIENTS],
@@ -205,7 +204,7 @@ impl<'a> SegmentFit<'a> {
         }
     }
 
-    /// A line with one sinusoid in addition to those of the given frequencies.
+    /// Best line with sinusoids of the frequencies `others` and one more, by a search over frequencies.
     fn add_sinusoid(&self, others: &[f64]) -> Option<MotionSegment> {
         let group_s =
             SEARCH_MEAN_S.min(2.0 * self.half / MIN_SEARCH_MEANS).max(2.0 * self.half / MAX_SEARCH_MEANS);
@@ -231,7 +230,7 @@ impl<'a> SegmentFit<'a> {
         self.refine_frequency(others, coarse, step_hz)
     }
 
-    /// A line with sinusoids of the given frequencies and one near `hz`, by golden section on all cells.
+    /// As [`add_sinusoid`](Self::add_sinusoid), within `within_hz` of `hz`, by golden section over all cells.
     fn refine_frequency(&self, others: &[f64], hz: f64, within_hz: f64) -> Option<MotionSegment> {
         let (mut lo, mut hi) = ((hz - within_hz).max(1e-4), hz + within_hz);
         let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
@@ -254,7 +253,7 @@ impl<'a> SegmentFit<'a> {
         self.fit(1, &sinusoids)
     }
 
-    /// Residual sum of squares of a line with sinusoids of the given frequencies and one of `hz`.
+    /// Residual sum of squares of a line with sinusoids of the frequencies `others` (1/s) and one of `hz`.
     fn sum_of_squares(&self, others: &[f64], hz: f64, t: &[f64], z: &[f64], cell_s: f64) -> f64 {
         let mut sinusoids = [0.0; 2];
         sinusoids[..others.len()].copy_from_slice(others);
@@ -264,7 +263,7 @@ impl<'a> SegmentFit<'a> {
         least_squares(t, z, 2 + 2 * sinusoids.len(), &rows).map_or(f64::INFINITY, |s| s.1)
     }
 
-    /// Whether means over several cells vary no more than white noise allows.
+    /// Whether means over [`WHITENESS_CELLS`] cells vary no more than those of white noise.
     fn is_white(&self, segment: &MotionSegment) -> bool {
         let sinusoids: Vec<f64> = segment.sinusoids.iter().map(|w| w[0]).collect();
         let mut off = Vec::with_capacity(self.t.len());
@@ -324,7 +323,7 @@ fn least_squares(
     let mut x = [0.0; MAX_COEFFICIENTS];
     x[..count].copy_from_slice(&solved);
     x[0] += base;
-    // From the residuals themselves: the normal equations lose it to rounding.
+    // Summed over residuals: the difference of sums in the normal equations loses precision.
     let mut left = 0.0;
     for (t, z) in t.iter().zip(z) {
         rows(&mut row, *t);

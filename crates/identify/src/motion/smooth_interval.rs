@@ -3,20 +3,20 @@
 use super::motion_segment::{MIN_CELLS, MotionSegment, cheaper};
 use super::velocity_estimate::fit_parabola;
 
-/// Half windows in cells.
+/// Half widths of the local windows, in cells; they grow by half each.
 const HALF_WINDOWS: [usize; 8] = [3, 5, 8, 12, 18, 27, 40, 60];
-/// Half width of the confidence intervals in standard deviations.
+/// Half width of the confidence intervals of the window selection, in standard deviations.
 const INTERVAL_SDS: f64 = 2.2;
-/// A segment must not leave more than this multiple of the position noise.
+/// Largest residual of a segment, as a multiple of the position noise.
 const MAX_NOISE_RATIO: f64 = 2.0;
-/// Cells excluded at either end of a constant-velocity interval: a drive needs up to half a second for a
-/// velocity change.
+/// Cells that may be excluded at either end of a constant-velocity interval: a drive needs up to half a second for a velocity change, half
+/// of it on either side of the jump.
 const RAMP_CELLS: [usize; 4] = [1, 3, 6, 12];
-/// Cost of a ramp in nats per cell: most drives reach their velocity within a few cells.
+/// Penalty of an excluded ramp in nats per cell: most drives reach their velocity within a few cells.
 const RAMP_NATS_PER_CELL: f64 = 0.5;
 
-/// Cell means: middle (s), position (m), length (s), standard deviation of the noise (m), amplitude of the
-/// first harmonic of the quantisation at constant velocity (m).
+/// Positions averaged over cells: midpoint `t` (s), mean `z` (m), length `dt` (s), standard deviation of the noise (m), and amplitude (m)
+/// of the first harmonic of the quantisation error at constant velocity.
 #[derive(Clone, Copy)]
 pub(super) struct Cells<'a> {
     pub t: &'a [f64],
@@ -26,24 +26,24 @@ pub(super) struct Cells<'a> {
     pub rounded_m: f64,
 }
 
-/// Motion between two velocity jumps.
+/// Motion of the cells `from..to` between two velocity jumps.
 pub(super) struct SmoothInterval {
     pub from: usize,
     pub to: usize,
-    /// A parametric segment with white residuals.
+    /// Parametric segment, if one has white residuals.
     pub segment: Option<MotionSegment>,
-    /// Otherwise position and velocity per cell.
+    /// Position and velocity per cell from local windows, without a segment.
     pub local: Vec<(f64, f64)>,
     /// Standard deviation of the velocity in m/s per cell.
     pub sds: Vec<f64>,
-    /// Nats of residuals and parameters; infinite without a segment.
+    /// Bayesian information criterion in nats; infinite without a segment.
     pub cost: f64,
 }
 
 impl SmoothInterval {
     pub fn new(cells: &Cells, (from, to): (usize, usize), hints: &[f64]) -> Self {
         let Cells { t: tc, z: zc, dt, noise_m, rounded_m } = *cells;
-        // Cells next to a jump have both velocities.
+        // A cell at a jump averages both velocities.
         let (lo, hi) = trimmed((from, to), 1, tc.len());
         let segment = if hi > lo + MIN_CELLS {
             MotionSegment::fit_best(&tc[lo..hi], &zc[lo..hi], dt, hints, rounded_m)
@@ -79,7 +79,7 @@ impl SmoothInterval {
         Self { from, to, segment: None, local, sds, cost: f64::INFINITY }
     }
 
-    /// A rest or a line between two velocity ramps of at most a third of the interval.
+    /// Best rest or line between two velocity ramps, which take up at most a third of the interval.
     fn even(cells: &Cells, (from, to): (usize, usize)) -> Option<MotionSegment> {
         let mut best = None;
         for cut in RAMP_CELLS {
@@ -90,8 +90,7 @@ impl SmoothInterval {
             let segment = MotionSegment::fit_constant_velocity(&cells.t[lo..hi], &cells.z[lo..hi], cells.dt);
             let mut segment = segment.filter(|c| c.white && c.sd_m < MAX_NOISE_RATIO * cells.noise_m);
             if let Some(c) = segment.as_mut() {
-                // The ramps are described as well as the rest, with one more parameter, and are less likely the
-                // longer they are.
+                // The excluded cells are assumed to fit as well as the others, with one more parameter and a penalty on their number.
                 let (all, n) = ((to - from) as f64, (hi - lo) as f64);
                 c.cost += (all - n) * libm::log(c.sd_m);
                 if cut > 1 {
@@ -108,7 +107,7 @@ impl SmoothInterval {
         self.segment.iter().flat_map(MotionSegment::frequencies).collect()
     }
 
-    /// Position and velocity at a time within.
+    /// Position (m) and velocity (m/s) at a time within the interval.
     pub fn at(&self, tc: &[f64], t: f64) -> (f64, f64) {
         if let Some(segment) = &self.segment {
             return segment.at(t);
@@ -126,12 +125,12 @@ impl SmoothInterval {
     }
 }
 
-/// An interval without `cut` cells at borders inside the recording.
+/// The interval without `cut` cells at each border that is inside the recording.
 fn trimmed((from, to): (usize, usize), cut: usize, cells: usize) -> (usize, usize) {
     (if from > 0 { from + cut } else { 0 }, if to < cells { to.saturating_sub(cut) } else { to })
 }
 
-/// The cheaper of the available segments.
+/// The segment with the lower cost, of those that exist.
 fn cheaper_of(a: Option<MotionSegment>, b: Option<MotionSegment>) -> Option<MotionSegment> {
     match a {
         Some(a) => Some(cheaper(a, b)),
@@ -139,8 +138,8 @@ fn cheaper_of(a: Option<MotionSegment>, b: Option<MotionSegment>) -> Option<Moti
     }
 }
 
-/// Position, velocity and its standard deviation at cell `i` from the widest window that agrees with all
-/// narrower ones.
+/// Position, velocity and its standard deviation at cell `i`, from a parabola over the widest window whose slope agrees with all narrower
+/// ones (intersection of confidence intervals).
 pub(super) fn adaptive_window_fit(
     t: &[f64],
     z: &[f64],
@@ -157,7 +156,7 @@ pub(super) fn adaptive_window_fit(
             continue;
         }
         let span = (t[hi - 1] - t[lo]).max(1e-9);
-        // Slope of a parabola over n cells: in the middle as for a line, at the end four times as uncertain.
+        // Standard error of the slope of a parabola over n cells: in the middle that of a line, at the end four times as much.
         let off = ((2.0 * t[i] - t[lo] - t[hi - 1]) / span).abs().min(1.0);
         let sd = noise_m * (12.0 / n as f64).sqrt() / span * (1.0 + 15.0 * off * off).sqrt();
         let [value, slope, _] = fit_parabola(&t[lo..hi], &z[lo..hi], t[i]).0;

@@ -1,10 +1,9 @@
-//! Position and velocity from noisy or coarsely quantised positions.
+//! Estimates position and velocity from noisy or coarsely quantised positions.
 //!
-//! Samples are averaged in cells of about 20 ms. Velocity jumps are where parabolas on both sides of a gap
-//! between cells meet with clearly different slopes. The interval between two jumps is a parametric
-//! `motion_segment` when that leaves white residuals. Otherwise every cell takes the widest window whose local
-//! parabola agrees with all narrower ones (intersection of confidence intervals: Goldenshluger and Nemirovski
-//! 1997).
+//! Samples are averaged over cells of 20 ms. A velocity jump is detected where parabolas on both sides of a gap between cells meet with
+//! significantly different slopes. The interval between two jumps is a parametric `motion_segment` if its residuals are white. Otherwise
+//! every cell uses the widest window whose parabola agrees with all narrower ones (intersection of confidence intervals: Goldenshluger and
+//! Nemirovski 1997).
 
 use super::acceleration_ramp::AccelerationRamp;
 use super::interval_borders::{
@@ -15,9 +14,9 @@ use super::smooth_interval::{Cells, SmoothInterval};
 use super::velocity_estimate::{SlopeBreak, VelocityJump, encoder_step, position_noise, slope_breaks};
 use stylet_stats::order_statistics::median;
 
-/// Length of a cell in s.
+/// Length of a cell (s), about that of a block.
 const CELL_S: f64 = 0.02;
-/// Cells on each side in the search for a jump.
+/// Cells of each parabola in the search for a jump.
 const JUMP_SIDE_CELLS: usize = 15;
 
 /// Smoothed motion at the sample times.
@@ -56,8 +55,8 @@ pub fn smooth_positions(t: &[f64], z: &[f64]) -> SmoothedMotion {
     let step_m = encoder_step(z);
     let noise_m = position_noise(t, z) / (q as f64).sqrt();
     let dt = step * q as f64;
-    // Slope at the end of a parabola over `side` cells: sd = noise sqrt(192/side^3)/dt; six of the difference
-    // of two.
+    // Standard error of the slope at the end of a parabola over `side` cells: noise sqrt(192/side^3)/dt. The threshold is six of the
+    // difference of two such slopes.
     let jump_sd = 6.0 * 2.0_f64.sqrt() * 13.9 * noise_m / (dt * libm::pow(JUMP_SIDE_CELLS as f64, 1.5));
     let found = slope_breaks(&tc, &zc, JUMP_SIDE_CELLS, (1.8 * dt, 1.8 * dt), jump_sd);
     let mut edges: Vec<usize> = found.iter().map(|b| b.0).collect();
@@ -107,7 +106,7 @@ fn jump_between(
     if let (Some(a), Some(b), Some(at)) =
         (&left.segment, &right.segment, intersection_time(left, right, cells))
     {
-        // Standard error at the end of a curved segment over that many cells.
+        // Standard error of the position at the end of a curved segment.
         let end = |s: &SmoothInterval, c: &MotionSegment| 3.0 * c.sd_m / ((s.to - s.from) as f64).sqrt();
         let sd_m = libm::hypot(end(left, a), end(right, b));
         return jump(at, 0.5 * (a.at(at).0 + b.at(at).0), [a.at(at).1, b.at(at).1], sd_m);

@@ -1,29 +1,27 @@
-//! Velocity and its jumps from recorded positions with little noise.
+//! Estimates velocity and its jumps from recorded positions with little noise.
 //!
-//! Friction turns a velocity error into a force error (0.01 mm/s are 5 mN at 500 Ns/m), so wide windows
-//! (`stylet_record::differentiate`) would leave structure at every ripple and stop. Here the window is the
-//! narrowest that the position noise allows, and none extends across a velocity jump, whose time is the
-//! intersection of the parabolas on both sides.
+//! Friction turns a velocity error into a force error (0.01 mm/s are 5 mN at 500 Ns/m), so the wide windows of
+//! `stylet_record::differentiate` would leave residuals at every ripple and stop. Here each window is as narrow as the position noise
+//! allows and ends at velocity jumps, which are located at the intersection of the parabolas on both sides.
 
 use stylet_stats::linear_algebra::SymmetricMatrix;
 use stylet_stats::order_statistics::median;
 
-/// Target standard deviation of the velocity in m/s.
+/// Target standard deviation of the velocity (m/s), which determines the window: 2.5 mN at 500 Ns/m.
 const TARGET_SD_MPS: f64 = 5e-6;
-/// Largest half window in samples.
+/// Largest half window (samples); with more noise, positions are smoothed instead (`smooth_positions`).
 const MAX_HALF_WINDOW: usize = 12;
-/// No window extends across a gap of more than this many sampling intervals.
+/// A time step longer than this many sampling intervals is a gap, which no window crosses.
 const MAX_GAP_STEPS: f64 = 5.5;
-/// Within a gap of at most this many s the velocity changes at most once: a jump is at the intersection of both
-/// sides.
+/// Longest gap (s) in which a velocity jump is located: within it the velocity is assumed to change once.
 const MAX_JUMP_GAP_S: f64 = 0.1;
-/// Smallest velocity jump in m/s.
+/// Smallest velocity jump (m/s): 10 mN at 500 Ns/m.
 pub const MIN_JUMP_MPS: f64 = 2e-5;
 
-/// A velocity jump between two samples, located by the positions.
+/// A velocity jump between two samples, located at the intersection of both motions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VelocityJump {
-    /// Index of the sample after it.
+    /// Index of the sample after the jump.
     pub next_sample: usize,
     /// Time in s.
     pub time_s: f64,
@@ -35,15 +33,15 @@ pub struct VelocityJump {
     pub position_sd_m: f64,
 }
 
-/// Velocities, their noise and jumps.
+/// Velocity at the samples, its noise, and jumps.
 #[derive(Clone, Debug, Default)]
 pub struct VelocityEstimate {
     /// Velocity in m/s at every sample.
     pub velocity_mps: Vec<f64>,
     /// Standard deviation in m/s due to position noise.
     pub sd_mps: f64,
-    /// Whether single positions are precise enough for derivatives of higher order: the position noise is at most that of a velocity of
-    /// 5e-6 m/s between two samples, as in simulated recordings. Measured positions are not.
+    /// Whether positions are precise enough for higher-order derivatives: the difference of two neighbouring samples determines the
+    /// velocity to 5e-6 m/s, as in simulated recordings.
     pub precise_positions: bool,
     /// Velocity jumps.
     pub jumps: Vec<VelocityJump>,
@@ -63,12 +61,12 @@ pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
     let step = median(&mut steps).max(1e-9);
     let noise_m = position_noise(t, z);
-    // Slope of a line over 2 m + 1 samples: sd = noise / (step sqrt(m (m+1) (2m+1) / 3)).
+    // Standard error of the slope of a line over 2 m + 1 samples: noise / (step sqrt(m (m+1) (2m+1) / 3)).
     let gain = |m: usize| 1.0 / (step * ((m * (m + 1) * (2 * m + 1)) as f64 / 3.0).sqrt());
     let precise_positions = core::f64::consts::SQRT_2 * noise_m <= TARGET_SD_MPS * step;
     let half = (1..MAX_HALF_WINDOW).find(|m| noise_m * gain(*m) <= TARGET_SD_MPS).unwrap_or(MAX_HALF_WINDOW);
     let side = (2 * half + 2).max(6);
-    // Slope at the end of a parabola over `side` samples: sd = noise sqrt(192/side^3)/step. Five of them.
+    // Five standard errors of the slope at the end of a parabola over `side` samples, noise sqrt(192/side^3)/step each.
     let jump_sd = 70.0 * noise_m / (step * libm::pow(side as f64, 1.5));
     let mut edges: Vec<usize> = vec![0];
     edges.extend((1..n).filter(|i| t[*i] - t[i - 1] > MAX_GAP_STEPS * step));
@@ -101,7 +99,7 @@ pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
             let (lo, hi) = if reach == half {
                 (i - half, i + half + 1)
             } else {
-                // Next to an edge: one-sided, wider.
+                // Next to an edge the window is one-sided and wider.
                 let lo = i.saturating_sub(half.max(2)).max(from);
                 let hi = (i + half.max(2) + 1).min(to);
                 if hi - lo >= 3 { (lo, hi) } else { (from, to.min(from + 3)) }
@@ -112,8 +110,8 @@ pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
     VelocityEstimate { velocity_mps: v, sd_mps: noise_m * gain(half), precise_positions, jumps }
 }
 
-/// Standard deviation of position noise from third divided differences, which are insensitive to irregular
-/// sampling.
+/// Standard deviation (m) of the position noise from third divided differences, which vanish for smooth motion under irregular sampling,
+/// and from the encoder step.
 pub(super) fn position_noise(t: &[f64], z: &[f64]) -> f64 {
     let mut d: Vec<f64> = t
         .windows(4)
@@ -128,23 +126,22 @@ pub(super) fn position_noise(t: &[f64], z: &[f64]) -> f64 {
             sum.abs() / squares.sqrt()
         })
         .collect();
-    // Quantised positions of a needle at rest do not differ at all.
+    // Differences of quantised positions at rest are zero and give no information.
     d.retain(|d| *d > 0.0);
     (median(&mut d) * stylet_stats::MAD_TO_SD).max(encoder_step(z) / 12.0_f64.sqrt())
 }
 
 /// Smallest plausible encoder step in m; smaller differences are floating-point rounding.
 const MIN_ENCODER_STEP_M: f64 = 1e-9;
-/// Positions are quantised when their differences are whole numbers of steps to within this share ...
+/// Largest distance of the position differences from multiples of the encoder step, as a share of the step, in quantised positions.
 const MAX_FRACTIONAL_STEP: f64 = 0.02;
-/// ... and the differences change in at least this share of the samples: constant velocity with rests has equal
-/// differences, too.
+/// Smallest share of samples in which the number of steps changes, in quantised positions; in exact positions at constant velocity with
+/// rests it changes rarely.
 const MIN_CHANGED_SHARE: f64 = 0.005;
 
-/// Encoder step in m to which positions are quantised; zero where they are not.
+/// Encoder step (m) of quantised positions; zero if they are not quantised.
 ///
-/// A needle slower than one step per sample rests in most samples and moves by a whole step in the others, so
-/// differences do not show the noise.
+/// A needle slower than one step per sample rests in most samples, so differences of neighbouring samples do not show the noise.
 pub(super) fn encoder_step(z: &[f64]) -> f64 {
     let moves = || z.windows(2).map(|w| w[1] - w[0]).filter(|d| d.is_finite());
     let mut sizes: Vec<f64> = moves().map(f64::abs).filter(|d| *d > MIN_ENCODER_STEP_M).collect();
@@ -162,11 +159,11 @@ pub(super) fn encoder_step(z: &[f64]) -> f64 {
     if uneven as f64 > MIN_CHANGED_SHARE * z.len() as f64 { step } else { 0.0 }
 }
 
-/// Slope break: the sample after it, (time, position, slope before), slope after.
+/// Slope break: index of the sample after it, (time, position, slope before), slope after.
 pub(super) type SlopeBreak = (usize, (f64, f64, f64), f64);
 
-/// Finds where parabolas on both sides of a gap between two samples intersect with different slopes. Windows do
-/// not extend across gaps longer than `gap_s`; gaps longer than `longest_s` are not bridged.
+/// Finds gaps between two samples at which parabolas on both sides meet with slopes that differ by more than `doubt_mps` plus the smallest
+/// jump. Windows do not cross gaps longer than `gap_s`; no jump is located in gaps longer than `longest_s`.
 pub(super) fn slope_breaks(
     t: &[f64],
     z: &[f64],
@@ -195,14 +192,14 @@ pub(super) fn slope_breaks(
         }
         // Solves z_left + v_left s = z_right - v_right (dt - s).
         let s = (right[0] - right[1] * dt - left[0]) / (left[1] - right[1]);
-        // In a long gap the motion may have been more complex.
+        // In a long gap, an intersection outside of it indicates more than one velocity change.
         if dt > gap_s && !(0.0..=dt).contains(&s) {
             continue;
         }
         let s = s.clamp(0.0, dt);
         found.push((off_left + off_right, (i, (t[i - 1] + s, left[0] + left[1] * s, left[1]), right[1])));
     }
-    // Of neighbouring candidates the one with the smallest residual.
+    // Of neighbouring candidates, the one with the smallest residual is kept.
     let mut out: Vec<SlopeBreak> = Vec::new();
     let mut last = 0.0;
     for (off, at) in found {
@@ -251,13 +248,14 @@ pub(super) fn fit_parabola(t: &[f64], z: &[f64], at: f64) -> ([f64; 3], f64) {
     ([x[0] + base, x[1] / span, x[2] / (span * span)], off)
 }
 
-/// Slope at the middle of five samples, of the quartic through them: the bias of a narrower parabola is a thousandth of the velocity at 2 Hz.
+/// Slope at the middle of five samples of the quartic through them; a parabola over the same samples has a larger bias (a thousandth of the
+/// velocity for three samples at 2 Hz).
 fn quartic_slope(t: &[f64], z: &[f64]) -> f64 {
     let at = t[2];
     (0..5)
         .filter(|j| *j != 2)
         .map(|j| {
-            // Derivative of Lagrange's polynomial j at the middle.
+            // Derivative of the Lagrange polynomial j at the middle.
             let others = (0..5).filter(|k| *k != 2 && *k != j);
             let weight: f64 = others.map(|k| (at - t[k]) / (t[j] - t[k])).product();
             (z[j] - z[2]) * weight / (t[j] - at)
@@ -265,7 +263,7 @@ fn quartic_slope(t: &[f64], z: &[f64]) -> f64 {
         .sum()
 }
 
-/// Slope at `at`: of a parabola, or of a line through two samples.
+/// Slope at time `at` of a least-squares parabola, or of the line through two samples; zero for fewer.
 fn slope_at(t: &[f64], z: &[f64], at: f64) -> f64 {
     match (t, z) {
         ([], _) | (_, []) | ([_], _) => 0.0,

@@ -1,14 +1,14 @@
-//! Detrended residuals: unmodelled smooth structure is not noise.
+//! Removes smooth trends from residuals, so that unmodelled smooth structure does not count as noise.
 
 use crate::block_averages::BlockAverages;
 use stylet_stats::linear_algebra::SymmetricMatrix;
 use stylet_stats::order_statistics::median;
 
-/// Length in s of the windows in which a parabola is removed.
+/// Length (s) of the windows in which a parabola is removed: unmodelled structure is smooth over it.
 const DETREND_WINDOW_S: f64 = 1.0;
 
-/// Residuals minus a least-squares parabola in windows of about one second. Windows whose variance exceeds 2.5
-/// times the median over the eight windows on either side are set to NaN.
+/// Residuals (N) minus a least-squares parabola in windows of [`DETREND_WINDOW_S`]. Windows whose variance exceeds 2.5 times the median
+/// over the eight windows on either side are set to NaN.
 pub(super) fn detrended_residuals(b: &BlockAverages, e: &[f64]) -> Vec<f64> {
     let length =
         (DETREND_WINDOW_S / (b.sample_step_s * b.samples_per_block as f64)).round().max(8.0) as usize;
@@ -38,7 +38,7 @@ pub(super) fn detrended_residuals(b: &BlockAverages, e: &[f64]) -> Vec<f64> {
                 out[k] = e[k] - c[0] - x(k) * (c[1] + x(k) * c[2]);
                 square += out[k] * out[k];
             }
-            // Three parameters were fitted.
+            // Corrects for the three fitted parameters.
             let lost = (m as f64 / (m as f64 - 3.0)).sqrt();
             out[from..to].iter_mut().for_each(|o| *o *= lost);
             windows.push((from, to, square / m as f64));

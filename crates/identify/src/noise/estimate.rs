@@ -14,33 +14,33 @@ use stylet_stats::robust_linear_prediction::{prediction_residual, robust_linear_
 const MAX_FORCE_BINS: usize = 5;
 /// Smallest number of blocks per range: its standard deviation is then known to 5 %.
 const MIN_BLOCKS_PER_BIN: usize = 220;
-/// Smallest noise in N: rounding of numbers in files.
+/// Smallest noise (N): below the rounding of numbers in files.
 const MIN_NOISE_N: f64 = 1e-6;
-/// Iterations of robust least squares.
+/// Iterations of iteratively reweighted least squares (IRLS).
 const IRLS_ITERATIONS: usize = 4;
 
-/// Which residuals the noise is estimated from.
+/// How the noise is estimated from residuals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoiseSource {
-    /// Residuals as they are: all of them is noise.
+    /// From all of the residuals; model discrepancy counts as noise.
     Residual,
-    /// Residuals as they are, with long memory: for intervals.
+    /// As `Residual`, with long memory; for confidence intervals.
     LongMemory,
-    /// As `LongMemory`, for simulated (bootstrap) residuals: they are normal, so plain least squares suffice.
+    /// As `LongMemory`, for simulated (bootstrap) residuals, which are normal, so that one least-squares solution suffices.
     Bootstrap,
-    /// Residuals minus their trend over one second, in the quieter windows: unmodelled structure is not noise.
+    /// From the residuals minus their trend over one second, without windows of high variance; model discrepancy does not count as noise.
     Detrended,
 }
 
 impl NoiseSource {
-    /// Whether the memory extends across breaks of a recording.
+    /// Whether the noise model has a long memory, across breaks of a recording.
     fn has_long_memory(self) -> bool {
         matches!(self, Self::LongMemory | Self::Bootstrap)
     }
 }
 
 impl Noise {
-    /// Noise of residuals `e` (N), one column per recording, with a lower bound of `floor_n`.
+    /// Noise model of residuals `e` (N, one column per recording), with standard deviations of at least `floor_n` (N).
     #[must_use]
     pub fn estimate(blocks: &[BlockAverages], e: &[Vec<f64>], from: NoiseSource, floor_n: f64) -> Self {
         let columns: Vec<Vec<f64>> = match from {
@@ -65,7 +65,8 @@ impl Noise {
         noise
     }
 
-    /// Fits one range by robust least squares; the order minimises the Bayesian information criterion.
+    /// Fits one force range by robust least squares. The autoregressive order minimises the BIC; with long memory it is the largest
+    /// stationary one.
     fn fit_bin(
         &self,
         blocks: &[BlockAverages],
@@ -103,7 +104,7 @@ impl Noise {
             NoiseSource::Residual => AR_ORDER + SEARCH_STRETCHES,
             NoiseSource::LongMemory | NoiseSource::Bootstrap => AR_ORDER + STRETCHES.len(),
         };
-        // Intervals must account for a drift that cannot be excluded: the largest stationary order is used.
+        // A slow drift that the data do not exclude widens confidence intervals, so the largest stationary order is used.
         let largest = from.has_long_memory();
         let turns = if from == NoiseSource::Bootstrap { 1 } else { IRLS_ITERATIONS };
         for order in (0..=most).map(|k| if largest { most - k } else { k }) {
@@ -138,7 +139,7 @@ impl Noise {
         }
         let mut best = best.map_or_else(|| ForceBinNoise::white(sd_n), |b| b.1);
         if from.has_long_memory() {
-            // The first blocks after a break depend on those before it and on each other.
+            // Predictors of the first blocks after a break use the blocks since the break and those before it.
             for (run, first) in best.after_break.iter_mut().enumerate() {
                 let columns: Vec<usize> = (1..=run).chain(AR_ORDER + 1..ROW_LEN).collect();
                 let (a, s) = robust_linear_prediction(&rows, &columns, (sd_n, floor_n), HUBER_K, turns);

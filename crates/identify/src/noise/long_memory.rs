@@ -1,15 +1,12 @@
-//! Long memory of slow drift: means over stretches further back than the autoregression (heterogeneous
-//! autoregression: Corsi 2009).
+//! Regressors for slow drift: means over stretches further back than the autoregression (heterogeneous autoregression: Corsi 2009).
 
-/// Largest autoregressive order.
+/// Largest autoregressive order, in blocks; slower correlation is covered by the stretch means.
 pub const AR_ORDER: usize = 4;
-/// Stretches of preceding blocks whose means are regressors: some tenths of a second, some seconds, ten
-/// seconds.
+/// Ranges of preceding blocks whose means are regressors: up to half a second, 2.5 s and 12 s back.
 pub(super) const STRETCHES: [(usize, usize); 3] = [(AR_ORDER, 24), (24, 124), (124, 624)];
-/// Number of stretches used during a model search; longer ones would absorb effects that evolve over tens of
-/// seconds.
+/// Number of stretches used during model selection; the longest would absorb effects that evolve over tens of seconds.
 pub(super) const SEARCH_STRETCHES: usize = 2;
-/// Length of a regression row: the residual, its predecessors, the means.
+/// Length of a regression row: the residual, its predecessors, the stretch means.
 pub(super) const ROW_LEN: usize = 1 + AR_ORDER + STRETCHES.len();
 
 /// Running sums of a column; values that are not finite or not used count as zero.
@@ -33,7 +30,7 @@ pub(super) fn stretch_means(sums: &[f64], k: usize, reach: usize) -> [f64; STRET
     })
 }
 
-/// Block `k`, its predecessors, and the stretch means.
+/// Regression row of block `k`: its residual, its predecessors, the stretch means.
 pub(super) fn regression_row(e: &[f64], sums: &[f64], k: usize, reach: usize) -> [f64; ROW_LEN] {
     let slow = stretch_means(sums, k, reach);
     core::array::from_fn(|i| if i <= AR_ORDER { e[k - i] } else { slow[i - AR_ORDER - 1] })

@@ -1,15 +1,13 @@
-//! Noise of measured force: autoregressive, with one set of coefficients and one variance per range of the
-//! force.
+//! Autoregressive noise model of block means, with coefficients and variance per range of the force.
 //!
-//! This covers noise that grows with the force and quiet stretches in air without special cases. Residuals are
-//! block means.
+//! The ranges cover noise that grows with the force as well as quiet stretches in air.
 //!
 //! | module | contents |
 //! |---|---|
 //! | `force_bin` | noise in one range of the force |
-//! | `estimate` | estimation from residuals |
+//! | `estimate` | estimation of the noise model from residuals |
 //! | `long_memory` | regressors of slow drift |
-//! | `whiten` | normalised innovations of residuals and the inverse |
+//! | `whiten` | normalised innovations of residuals, and the inverse |
 //! | `detrend` | residuals without their smooth trend |
 
 mod detrend;
@@ -25,9 +23,9 @@ pub use whiten::WhiteningPlan;
 
 use stylet_stats::Loss;
 
-/// Threshold in standard deviations beyond which a residual counts linearly (Huber).
+/// Huber threshold in standard deviations: beyond it the loss of a residual is linear.
 pub const HUBER_K: f64 = 2.5;
-/// Loss of a normalised residual in nats.
+/// Huber loss of a normalised residual, in nats.
 pub const HUBER_LOSS: Loss = Loss::Huber { k: HUBER_K };
 
 /// Noise model of a set of recordings.
@@ -37,12 +35,12 @@ pub struct Noise {
     pub edges_n: Vec<f64>,
     /// Noise per force range.
     pub bins: Vec<ForceBinNoise>,
-    /// The long memory extends across breaks of a recording, such as velocity jumps.
+    /// Whether the long memory extends across breaks of a recording, such as velocity jumps.
     pub long_memory: bool,
 }
 
 impl Noise {
-    /// Independent noise of one standard deviation.
+    /// White noise with standard deviation `sd_n` (N).
     #[must_use]
     pub fn white(sd_n: f64) -> Self {
         Self { edges_n: Vec::new(), bins: vec![ForceBinNoise::white(sd_n)], long_memory: false }
@@ -54,7 +52,7 @@ impl Noise {
         self.edges_n.iter().take_while(|e| **e <= size_n).count()
     }
 
-    /// Noise at a force magnitude.
+    /// Noise of the range of a force magnitude (N).
     #[must_use]
     pub fn bin_at(&self, size_n: f64) -> &ForceBinNoise {
         &self.bins[self.bin_index(size_n).min(self.bins.len() - 1)]

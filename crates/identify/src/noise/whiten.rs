@@ -1,16 +1,16 @@
-//! Normalised innovations of residuals, and the inverse.
+//! Whitens residuals with the noise model, and inverts the whitening.
 
 use super::long_memory::{STRETCHES, running_sums, stretch_means};
 use super::{AR_ORDER, ForceBinNoise, Noise};
 use crate::block_averages::BlockAverages;
 
-/// Precomputed whitening of one recording.
+/// Precomputed whitening of one recording: predictor and standard deviation per block.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WhiteningPlan {
     rows: Vec<BlockWhitening>,
-    /// Some range has a long memory.
+    /// Whether any force range has a long memory.
     has_long_memory: bool,
-    /// Consecutive blocks of one range with [`AR_ORDER`] predecessors and no long memory: first, end, range.
+    /// Runs (first, end, range) of blocks in one range with [`AR_ORDER`] predecessors and without long memory.
     plain_runs: Vec<(usize, usize, u32)>,
 }
 
@@ -28,7 +28,7 @@ struct BlockWhitening {
 }
 
 impl Noise {
-    /// Computes how the blocks of a recording are whitened.
+    /// Computes the whitening plan of a recording.
     #[must_use]
     pub fn whitening_plan(&self, b: &BlockAverages) -> WhiteningPlan {
         let mut run = 0;
@@ -102,7 +102,7 @@ impl Noise {
             w / row.sd_n
         };
         let mut out = vec![0.0; e.len()];
-        // Leading and trailing zeros stay zero beyond the memory.
+        // Whitened values are zero before the first non-zero residual, and after the last one beyond the memory.
         let reach = if laid.has_long_memory { STRETCHES[STRETCHES.len() - 1].1 } else { AR_ORDER };
         let first = e.iter().position(|e| *e != 0.0).unwrap_or(e.len());
         let end = e.iter().rposition(|e| *e != 0.0).map_or(0, |k| (k + 1 + reach).min(e.len()));
@@ -157,7 +157,7 @@ impl Noise {
         e
     }
 
-    /// Predictor of a block: coefficients of its predecessors and of the stretch means.
+    /// Coefficients of the predecessors and of the stretch means that predict a block.
     fn predictor(&self, row: &BlockWhitening) -> (&[f64; AR_ORDER], &[f64; STRETCHES.len()]) {
         let bin = &self.bins[row.bin as usize];
         bin.after_break

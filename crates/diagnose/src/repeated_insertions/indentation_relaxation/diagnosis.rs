@@ -1,4 +1,4 @@
-//! Diagnosis of many indented specimens.
+//! Converts the analysis of many indented specimens to a diagnosis.
 
 use super::{SpecimenReport, relaxation};
 use crate::claims::{self, Context};
@@ -9,7 +9,7 @@ use crate::repeated_insertions::segmented_recording::SegmentedRecording;
 use stylet_tissue::{AnyEffect, Effect, PowerLawFriction, RateDependentPuncture, ShaftSlip};
 
 impl SpecimenReport {
-    /// Effects of the kept candidates, each once.
+    /// Effects of the kept candidates, without repetition.
     pub fn kept_effects(&self) -> impl Iterator<Item = &str> {
         let mut ids: Vec<&str> = Vec::new();
         for effect in self.candidates.iter().filter(|r| r.kept).filter_map(|r| r.effect.as_deref()) {

@@ -1,8 +1,7 @@
-//! Relaxation of many specimens, each indented once and held: effects missing from the base law, held-out
-//! error of the rest of the hold, and statistics of the parameters.
+//! Analyses the relaxation of many specimens, each indented once and held: effects missing from the base law, held-out error of the rest of
+//! the hold, and statistics of the parameters.
 //!
-//! Every specimen is a material of its own. A model is fitted to the ramp and the first part of the hold;
-//! the rest of the hold is held out.
+//! Every specimen is a separate material. A model is fitted to the ramp and the first part of the hold; the rest of the hold is held out.
 
 mod diagnosis;
 
@@ -22,20 +21,22 @@ use stylet_tissue::{AnyEffect, Effect, NonlinearElasticity, PronyTerm, StressRel
 
 /// Share of the hold that is fitted.
 const FITTED_HOLD_SHARE: f64 = 0.6;
-/// Smallest relative decrease of the mean error, held out or fitted, for keeping an effect ...
+/// Smallest relative decrease of the mean error, held out or fitted, for an effect to be kept.
 const MIN_RELATIVE_GAIN: f64 = 0.1;
-/// ... and smallest share of specimens that improve.
+/// Smallest share of specimens that must improve for an effect to be kept.
 const MIN_IMPROVED_SHARE: f64 = 0.75;
-/// Length of a block in s.
+/// Length of a block (s): relaxation is slow, so blocks may be longer than in insertions.
 const BLOCK_S: f64 = 0.08;
-/// Noise of a fit in multiples of the sensor noise, and its lower limit as a share of the largest force.
+/// Noise of a fit in multiples of the sensor noise, which leaves room for model error.
 const NOISE_FACTOR: f64 = 3.0;
+/// Lower bound of the noise of a fit, as a share of the largest force.
 const MIN_NOISE_SHARE: f64 = 1e-3;
-/// Shortest hold (s) and smallest number of samples.
+/// Shortest hold (s) of a usable specimen.
 const MIN_HOLD_S: f64 = 3.0;
+/// Smallest number of samples of a usable specimen.
 const MIN_SAMPLES: usize = 50;
 
-/// Termination of a fit.
+/// Stopping criteria of a fit.
 const FIT_EFFORT: Effort = Effort { max_iterations: 40, min_gain_nats: 1e-3 };
 
 /// Statistics of a parameter over the specimens.
@@ -56,7 +57,7 @@ pub struct SpecimenStatistic {
 /// A candidate model in the sequence.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CandidateModel {
-    /// Added effect; `base law` first.
+    /// Name of the step: the added effect, or `base law`.
     pub step: String,
     /// Effect id.
     pub effect: Option<String>,
@@ -77,7 +78,7 @@ pub struct SpecimenReport {
     pub used: usize,
     /// Specimens that were not used, with the reason.
     pub unused: Vec<(String, String)>,
-    /// Specimens whose force drops as at a puncture.
+    /// Specimens with a force drop as at a puncture.
     pub punctured: Vec<String>,
     /// Candidate models.
     pub candidates: Vec<CandidateModel>,
@@ -85,11 +86,11 @@ pub struct SpecimenReport {
     pub parameters: Vec<SpecimenStatistic>,
 }
 
-/// Per candidate: RMS errors (N) on the fitted and the held-out part, and the model.
+/// Fits of one specimen: per candidate, RMS errors (N) on the fitted and the held-out part, and the model.
 struct SpecimenFits {
     errors: Vec<(f64, f64)>,
     models: Vec<Model>,
-    /// The same without the curvature of the spring.
+    /// The same without the nonlinear spring.
     straight: Vec<((f64, f64), Model)>,
 }
 
@@ -104,7 +105,7 @@ fn relaxation(terms: &[(f64, f64)]) -> AnyEffect {
     StressRelaxation { terms: terms.iter().map(term).collect() }.into()
 }
 
-/// Candidates, each built on the previous one, with their start values.
+/// Candidate models, each an extension of the previous one, with their start values.
 fn candidate_sequence() -> [(&'static str, Vec<AnyEffect>); 4] {
     [
         ("base law", Vec::new()),
@@ -127,7 +128,7 @@ fn candidate_sequence() -> [(&'static str, Vec<AnyEffect>); 4] {
     ]
 }
 
-/// Analyses specimens one by one.
+/// Analyses each specimen, and selects one sequence of effects for all of them.
 #[must_use]
 pub fn analyze_specimens(assumed: &Tissue, recordings: &[SegmentedRecording]) -> Option<SpecimenReport> {
     let mut unused = Vec::new();
@@ -181,8 +182,8 @@ fn total_error(errors: (f64, f64)) -> f64 {
     errors.0 + errors.1
 }
 
-/// Whether the nonlinear spring is kept in the selected model. The ramp of a relaxing linear spring looks
-/// curved, so the test is repeated once the relaxation is modelled.
+/// Whether the nonlinear spring is kept in the selected model. The ramp of a relaxing linear spring is curved, so the test is repeated with
+/// the relaxation in the model.
 fn retest_curvature(each: &[SpecimenFits], candidates: &mut [CandidateModel], selected: usize) -> bool {
     let Some(at) = candidates.iter().position(|r| r.effect.as_deref() == Some(curvature())) else {
         return false;
@@ -204,7 +205,7 @@ fn retest_curvature(each: &[SpecimenFits], candidates: &mut [CandidateModel], se
     candidates[at].kept
 }
 
-/// Whether a recording is a ramp and a hold.
+/// Checks that a recording is a ramp and a hold; the error is the reason why not.
 fn check_ramp_and_hold(run: &SegmentedRecording) -> Result<(), String> {
     let t = &run.recording.time_s;
     let hold = t[t.len() - 1] - t[run.phases.deepest];
@@ -246,7 +247,7 @@ fn fit_specimen(assumed: &Tissue, run: &SegmentedRecording) -> Option<SpecimenFi
         let starts = if effects.is_empty() { vec![model.clone()] } else { Vec::new() };
         let with = |effect: &AnyEffect| {
             let term = EffectTerm::new(effect.info(), &effect.parameters());
-            // Two terms replace one.
+            // The candidate replaces a term of the same effect.
             let one = model.effects.iter().position(|c| c.info.id == term.info.id);
             one.map_or_else(|| model.clone(), |k| model.without_effect(k)).with_effect(term)
         };
@@ -268,7 +269,7 @@ fn fit_specimen(assumed: &Tissue, run: &SegmentedRecording) -> Option<SpecimenFi
     Some(out)
 }
 
-/// Statistics of the effect parameters of the selected model.
+/// Statistics of the effect parameters of the selected model over the specimens.
 fn parameter_statistics(each: &[SpecimenFits], candidate: usize, curved: bool) -> Vec<SpecimenStatistic> {
     let models: Vec<&Model> =
         each.iter().map(|o| if curved { &o.models[candidate] } else { &o.straight[candidate].1 }).collect();
@@ -299,7 +300,7 @@ fn parameter_statistics(each: &[SpecimenFits], candidate: usize, curved: bool) -
         .collect()
 }
 
-/// Parameter of a model by path, relaxation terms sorted by time constant.
+/// Parameter of a model by path, with relaxation terms in ascending order of their time constants.
 fn parameter_value(model: &Model, path: &str) -> Option<f64> {
     let of = |path: &str| {
         model.effects.iter().find_map(|c| {

@@ -1,5 +1,5 @@
-//! Baseline of the force sensor in air: offset, drift, noise, tone and drive friction, from a recording in
-//! air or from the stretches of an insertion before and after contact.
+//! Estimates the baseline of the force sensor in air (offset, drift, noise, tone, drive friction) from a recording in air, or from an
+//! insertion before and after contact.
 
 use crate::repeated_insertions::segmented_recording::SegmentedRecording;
 use stylet_identify::insertion_phases::noise_n;
@@ -7,12 +7,11 @@ use stylet_record::Recording;
 use stylet_stats::linear_algebra::{SymmetricMatrix, dot};
 use stylet_stats::{mean, median_of, rms};
 
-/// Share of the way to the assumed surface that counts as air, because the surface may be nearer than
-/// assumed.
+/// Share of the distance to the assumed surface that counts as air: the surface may be nearer than assumed.
 const AIR_SHARE: f64 = 0.5;
-/// Smallest number of samples in air.
+/// Smallest number of samples in air for a line or a tone.
 const MIN_AIR_SAMPLES: usize = 20;
-/// A force that scatters about its line by more than this multiple of its noise is not measured in air.
+/// Ratio of the RMS residual about a line to the noise above which a force is not measured in air.
 const MAX_NOISE_RATIO: f64 = 2.0;
 /// Speed (m/s) above which the drive moves.
 const MIN_DRIVE_SPEED_MPS: f64 = 2e-4;
@@ -28,7 +27,7 @@ pub struct LinearTrend {
     pub sd_n: f64,
 }
 
-/// Least-squares line.
+/// Least-squares line through forces `f` (N) at times `t` (s).
 #[must_use]
 pub fn fit_trend(t: &[f64], f: &[f64]) -> LinearTrend {
     let (middle, level) = (mean(t), mean(f));
@@ -66,7 +65,7 @@ pub struct AirAnalysis {
     pub ar1: f64,
     /// Amplitude (N) and frequency (Hz) of the strongest sinusoid.
     pub tone: Option<(f64, f64)>,
-    /// Half the force difference (N) between moving forward and backward.
+    /// Half the force difference (N) between forward and backward motion.
     pub drive_friction_n: Option<f64>,
 }
 
@@ -83,8 +82,7 @@ impl AirAnalysis {
             v if !moves || v.abs() <= MIN_DRIVE_SPEED_MPS => 0.0,
             v => v.signum(),
         };
-        // Fitted together, because forward motion comes before backward motion and would alias with a
-        // drift.
+        // Drift and drive friction are fitted jointly, because forward motion precedes backward motion.
         let middle = mean(t);
         let rows: Vec<[f64; 3]> = (0..t.len()).map(|i| [1.0, t[i] - middle, drive(i)]).collect();
         let (x, rest) = least_squares(&rows, f);
@@ -108,7 +106,7 @@ fn air_limit_m(r: &Recording, surface_m: f64) -> f64 {
     from + AIR_SHARE * (surface_m - from)
 }
 
-/// Line through the force of some samples, if it is straight.
+/// Line through the force of some samples; `None` if the force is not straight.
 fn straight_trend(r: &Recording, samples: std::ops::Range<usize>) -> Option<LinearTrend> {
     if samples.len() < MIN_AIR_SAMPLES {
         return None;
@@ -124,8 +122,7 @@ fn samples_before_contact(r: &Recording, surface_m: f64) -> Option<std::ops::Ran
     (surface_m > r.position_m[0]).then_some(0..end)
 }
 
-/// Lines through the force before contact, for the recordings in which it is straight: the tissue's force
-/// is not.
+/// Lines through the force before contact, of the recordings in which it is straight; a force of tissue is not.
 #[must_use]
 pub fn pre_contact_trends(recordings: &[&SegmentedRecording], surface_m: f64) -> Vec<LinearTrend> {
     recordings
@@ -134,13 +131,13 @@ pub fn pre_contact_trends(recordings: &[&SegmentedRecording], surface_m: f64) ->
         .collect()
 }
 
-/// Drift (N/s) between the air before and after an insertion.
+/// Drift (N/s) between the air before and after an insertion; `None` if either force is not straight.
 #[must_use]
 pub fn air_drift_n_per_s(run: &SegmentedRecording, surface_m: f64) -> Option<f64> {
     let r = &run.recording;
     let there = samples_before_contact(r, surface_m)?;
     let back = r.position_m.iter().rposition(|z| *z > air_limit_m(r, surface_m))? + 1;
-    // The first half after the insertion is skipped: a slow sensor still decays.
+    // The first half after the insertion is skipped, because a slow sensor is still decaying.
     let settled = back + (r.len() - back) / 2;
     let (before, after) = (straight_trend(r, there.clone())?, straight_trend(r, settled..r.len())?);
     let level = |l: LinearTrend, from: usize, to: usize| {
@@ -151,7 +148,7 @@ pub fn air_drift_n_per_s(run: &SegmentedRecording, surface_m: f64) -> Option<f64
     Some(change / (middle(settled, r.len()) - middle(0, there.end)))
 }
 
-/// Median of a quantity over the recordings; zero when they do not agree.
+/// Median over the recordings; zero if its median absolute deviation exceeds half of it.
 #[must_use]
 pub fn consensus(values: &[f64]) -> f64 {
     let middle = median_of(values.iter().copied());
@@ -159,7 +156,7 @@ pub fn consensus(values: &[f64]) -> f64 {
     if apart < 0.5 * middle.abs() { middle } else { 0.0 }
 }
 
-/// Strongest sinusoid (amplitude, frequency) up to half the sampling rate, at the actual time stamps.
+/// Amplitude (N) and frequency (Hz) of the strongest sinusoid up to half the sampling rate, at the actual time stamps.
 fn strongest_tone(t: &[f64], e: &[f64]) -> Option<(f64, f64)> {
     let duration = t[t.len() - 1] - t[0];
     if duration <= 0.0 || t.len() < MIN_AIR_SAMPLES {

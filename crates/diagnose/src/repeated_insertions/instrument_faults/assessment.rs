@@ -1,4 +1,4 @@
-//! Assessment of the instrument: bias, drift, noise, tone, drive friction, gain, delay and lag.
+//! Assesses the instrument: bias, drift, noise, tone, drive friction, gain, delay and lag of the force.
 
 use super::air_baseline::{
     AirAnalysis, LinearTrend, air_drift_n_per_s, consensus, fit_trend, pre_contact_trends,
@@ -14,10 +14,9 @@ use stylet_tissue::{
     TimeDelay,
 };
 
-/// Faults below this share of the largest force are negligible: residuals of fitted models are several
-/// times larger.
+/// Share of the largest force below which a fault is negligible: residuals of fitted models are several times larger.
 pub const NEGLIGIBLE_SHARE: f64 = 0.02;
-/// A load with this share of equal readings at one end is saturated or quantised.
+/// Share of equal extreme readings from which a known load is saturated or quantised.
 const MAX_EQUAL_SHARE: f64 = 0.3;
 
 /// Recordings of the instrument without tissue.
@@ -70,7 +69,7 @@ impl InstrumentReport {
         out
     }
 
-    /// Bias, drift, noise and tone: from the insertions where possible, else from the recording in air.
+    /// Sets bias, drift, noise and tone, from the insertions where possible, else from the recording in air.
     fn set_baseline(
         &mut self,
         air: Option<&AirAnalysis>,
@@ -92,7 +91,7 @@ impl InstrumentReport {
         }
         if air.is_none() {
             self.noise_n = Some(stylet_stats::median_of(lines.iter().map(|l| l.sd_n)));
-            // Extrapolating a slope from a short stretch of air is uncertain.
+            // The slope of a short stretch in air is used only if its uncertainty over the recording is negligible.
             let rates = of(|l| l.rate_n_per_s);
             self.drift_n = mean_interval(&rates)
                 .filter(|i| 0.5 * (i.high - i.low) * duration_s < NEGLIGIBLE_SHARE * force_n)
@@ -100,7 +99,7 @@ impl InstrumentReport {
         }
     }
 
-    /// Sorts the faults into excluded and detected ones.
+    /// Classifies the faults as excluded or detected.
     fn classify(&mut self, force_n: f64, duration_s: f64, has_air_recording: bool, lag: Option<DetectedLag>) {
         let (mut excluded, mut detected) = (Vec::new(), Vec::new());
         let mut classify = |effect_model: AnyEffect, max_force_n: f64, reported: usize, evidence: String| {
@@ -109,7 +108,7 @@ impl InstrumentReport {
                 excluded.push(ExcludedFault { effect, max_force_n: max_force_n.abs(), evidence });
                 return;
             }
-            // The standard error of a mean is far below the threshold.
+            // The interval is omitted: the standard error of a mean is far below the threshold.
             let of = |value: f64| Estimate { value, low: value, high: value };
             let values = effect_model.parameters();
             let named = effect_model.info().parameters.iter().zip(values).take(reported);
@@ -138,7 +137,7 @@ impl InstrumentReport {
         if let Some((amplitude_n, frequency_hz)) = self.tone.filter(|_| has_air_recording) {
             let tone = PeriodicInterference { amplitude_n, frequency_hz, phase_rad: 0.0 };
             let evidence = format!("strongest tone in air {} at {frequency_hz:.1} Hz", mn(amplitude_n));
-            // The phase differs from recording to recording.
+            // The phase, which differs between recordings, is not reported.
             classify(tone.into(), amplitude_n, 2, evidence);
         }
         if let Some(drive_n) = self.drive_friction_n.filter(|_| has_air_recording) {
@@ -174,7 +173,7 @@ impl InstrumentReport {
     }
 }
 
-/// Measured over known force, minus one; `None` when the sensor is saturated or too coarse.
+/// Measured over known force minus one; `None` when the sensor is saturated or too coarse.
 fn load_gain_error(recording: &Recording, known: f64, zero_n: f64, drifts: bool) -> Option<f64> {
     let f = &recording.force_n;
     let most = f.iter().copied().fold(f64::NEG_INFINITY, f64::max);

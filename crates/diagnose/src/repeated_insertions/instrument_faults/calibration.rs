@@ -1,4 +1,4 @@
-//! Correction of detected instrument faults.
+//! Corrects detected instrument faults in the recordings.
 
 use super::air_baseline::fit_trend;
 use super::assessment::NEGLIGIBLE_SHARE;
@@ -8,7 +8,7 @@ use stylet_record::Recording;
 use stylet_record::sensor_artefacts::{self, SensorArtefacts};
 use stylet_tissue::AnyEffect;
 
-/// Samples on either side for the slope of the force.
+/// Samples on either side in the slope of the force.
 const SLOPE_HALF_WINDOW: usize = 3;
 
 /// Recordings with detected faults corrected, and the sensor artefacts of the raw forces.
@@ -16,13 +16,12 @@ const SLOPE_HALF_WINDOW: usize = 3;
 pub struct CalibratedRecordings {
     /// Corrected recordings.
     pub recordings: Vec<SegmentedRecording>,
-    /// Artefacts of the raw force: limits and steps are those of the sensor.
+    /// Artefacts of the raw force; its limits and steps are those of the sensor.
     pub artefacts: SensorArtefacts,
 }
 
 impl InstrumentReport {
-    /// Corrects the detected faults: delay, then lag, then drift, bias and gain. Without faults the
-    /// recordings are unchanged.
+    /// Corrects the detected faults: delay, then lag, then drift, bias and gain.
     #[must_use]
     pub fn calibrate(&self, recordings: &[&SegmentedRecording]) -> CalibratedRecordings {
         let of = |e: &AnyEffect| if let AnyEffect::TimeDelay(d) = e { d.delay_s } else { 0.0 };
@@ -56,14 +55,14 @@ impl InstrumentReport {
         CalibratedRecordings { recordings, artefacts }
     }
 
-    /// Corrected faults as effects of a simulation, without tones (averaged in blocks) and drive friction.
+    /// Corrected faults as effects of a simulation, without tones (which block means remove) and drive friction.
     pub(crate) fn correctable_effects(&self) -> Vec<AnyEffect> {
         let correctable =
             |e: &AnyEffect| !matches!(e, AnyEffect::PeriodicInterference(_) | AnyEffect::DriveFriction(_));
         self.detected.iter().filter_map(|s| s.effect_model.clone()).filter(correctable).collect()
     }
 
-    /// `drift_n_per_s`: the recording's own drift, if known.
+    /// Corrects the force of a recording; `drift_n_per_s` is its own drift, if known.
     fn calibrate_force(&self, recording: &mut Recording, drift_n_per_s: Option<f64>) {
         let effects = self.correctable_effects();
         for e in &effects {
@@ -93,8 +92,7 @@ impl InstrumentReport {
     }
 }
 
-/// The recording with its force shifted forward by a delay, without interpolation. Samples at the end
-/// without a value are dropped.
+/// The recording with its force shifted forward by a delay to the nearest sample; samples at the end without a value are dropped.
 fn remove_delay(recording: &Recording, delay_s: f64) -> Recording {
     let mut out = recording.clone();
     if delay_s <= 0.0 {
@@ -121,7 +119,7 @@ fn remove_delay(recording: &Recording, delay_s: f64) -> Recording {
     out
 }
 
-/// Inverts a first-order lag: force plus time constant times slope.
+/// Inverts a first-order lag: force plus time constant times its slope.
 fn remove_lag(recording: &mut Recording, lag_s: f64) {
     if lag_s <= 0.0 {
         return;

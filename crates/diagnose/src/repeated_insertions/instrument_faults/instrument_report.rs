@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use stylet_tissue::AnyEffect;
 
-/// Confidence in a directly detected fault.
+/// Confidence in a fault that was measured directly, without a tissue model.
 const DETECTION_CONFIDENCE: f64 = 0.99;
 
 /// Result of the instrument assessment.
@@ -19,14 +19,14 @@ pub struct InstrumentReport {
     pub bias_n: Option<f64>,
     /// Drift of the force in air over a recording (N).
     pub drift_n: Option<f64>,
-    /// Drift per recording (N/s), where it begins and ends in air.
+    /// Drift of each recording (N/s) that begins and ends in air.
     #[serde(skip)]
     pub drifts_n_per_s: Vec<Option<f64>>,
     /// Amplitude (N) and frequency (Hz) of the strongest tone in air.
     pub tone: Option<(f64, f64)>,
-    /// Half the force difference (N) between moving forward and backward in air.
+    /// Half the force difference (N) between forward and backward motion in air.
     pub drive_friction_n: Option<f64>,
-    /// Measured over known force, minus one.
+    /// Measured over known force minus one.
     pub gain: Option<f64>,
     /// Delay of the force (s).
     #[serde(default)]
@@ -52,13 +52,13 @@ pub struct DetectedFault {
     pub max_force_n: f64,
     /// Measured evidence in words.
     pub evidence: String,
-    /// The effect, for the correction.
+    /// The effect, used for the correction.
     #[serde(skip)]
     pub effect_model: Option<AnyEffect>,
 }
 
 impl DetectedFault {
-    /// As a cause of a diagnosis.
+    /// The fault as a cause of a diagnosis.
     #[must_use]
     pub fn cause(&self) -> Cause {
         Cause {

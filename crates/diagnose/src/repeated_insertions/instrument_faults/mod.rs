@@ -1,6 +1,5 @@
-//! Faults of the force sensor and the drive, detected without a tissue model: from a motion in air, a known
-//! load, the air before contact and the corners of the motion. Detected faults are corrected before any
-//! fit; excluded ones cannot explain a residual.
+//! Detects faults of the force sensor and the drive without a tissue model: from a motion in air, a known load, the air before contact, and
+//! corners of the motion. Detected faults are corrected before any fit; excluded ones cannot explain a residual.
 
 mod air_baseline;
 mod assessment;

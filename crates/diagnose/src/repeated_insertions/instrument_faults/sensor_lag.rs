@@ -1,12 +1,10 @@
-//! Delay or lag of the force sensor, from the corners of the motion: where the needle stops and where the
-//! retraction begins. The force responds at once unless the sensor or its clock is delayed (the corner
-//! moves) or low-pass filtered (the corner is rounded).
+//! Detects a delay or lag of the force sensor from the corners of the motion, where the needle stops and where the retraction begins. A
+//! delay of the sensor or its clock shifts the corner of the force; a low-pass filter rounds it.
 //!
-//! The force before a corner is a line, in position at the stop and in time at the reversal. Behind the
-//! reversal a spring and a friction that builds up over a length `delta` respond to the distance `u`
-//! travelled back: `f = a + b t + c L[u] + d L[1 - exp(-u / delta)]`, with the delay in `u` and the
-//! low-pass filter `L`. Behind the stop the tissue relaxes, and `u` is the time since the stop. The
-//! coefficients are fitted per recording; `delta` and the delay or lag are common to all.
+//! Before a corner the force is a line, in position at the stop and in time at the reversal. After the reversal, a spring and a friction
+//! that builds up over a length `delta` respond to the distance `u` travelled back: `f = a + b t + c L[u] + d L[1 - exp(-u / delta)]`, with
+//! the delay in `u` and the low-pass filter `L`. After the stop the tissue relaxes, and `u` is the time since the stop. The coefficients
+//! are fitted per recording; `delta` and the delay or lag are common to all.
 
 use super::air_baseline::least_squares;
 use crate::repeated_insertions::segmented_recording::SegmentedRecording;
@@ -14,22 +12,21 @@ use stylet_record::Recording;
 use stylet_stats::parallel::*;
 use stylet_stats::{interpolate, sd, student_t};
 
-/// Window (s) before and after the corner.
+/// Window (s) before and after a corner.
 const WINDOW_S: (f64, f64) = (1.0, 0.8);
-/// Time (s) before the corner in which the needle cannot have turned.
+/// Time (s) before the reversal from which the needle is assumed not to have turned yet.
 const STANDSTILL_S: f64 = 0.2;
-/// Largest delay or lag (s).
+/// Largest delay or lag (s) that is searched.
 const MAX_LAG_S: f64 = 0.8;
-/// Step (s) of delays and lags.
+/// Step (s) of the search.
 const STEP_S: f64 = 0.02;
-/// Smallest delay or lag (s) attributed to the sensor: play and rounded corners of the drive cause shorter
-/// ones.
+/// Smallest delay or lag (s) attributed to the sensor; play and rounded corners of the drive cause shorter ones.
 const MIN_LAG_S: f64 = 0.08;
-/// Lengths over which the response builds up: friction after the reversal (m), relaxation after a stop (s).
+/// Trial lengths over which the response builds up: friction after a reversal (m), relaxation after a stop (s).
 const BUILD_UP_LENGTHS: [[f64; 5]; 2] = [[3e-4, 6e-4, 8e-4, 1e-3, 1.5e-3], [0.1, 0.2, 0.4, 0.8, 1.6]];
-/// Memory of the low-pass filter in time constants.
+/// Memory of the low-pass filter, in time constants: its initial state has then decayed to less than 1 %.
 const FILTER_MEMORY: f64 = 5.0;
-/// A delay or lag must reduce the mean square residual at the corners to this share.
+/// Largest ratio of the mean square residual at the corners with a delay or lag to that without.
 const MAX_RESIDUAL_RATIO: f64 = 0.9;
 
 /// Model of the sensor dynamics.
@@ -54,7 +51,7 @@ pub struct DetectedLag {
     pub high_s: f64,
 }
 
-/// Detects a delay or lag common to the recordings.
+/// Detects a delay or lag common to the recordings; `None` if it does not improve the fit enough.
 #[must_use]
 pub fn detect_lag(recordings: &[&SegmentedRecording]) -> Option<DetectedLag> {
     let corners =
@@ -78,7 +75,7 @@ pub fn detect_lag(recordings: &[&SegmentedRecording]) -> Option<DetectedLag> {
         .min_by(|a, b| minimum(&a.1).1.total_cmp(&minimum(&b.1).1))
         .and_then(|(how, all, left)| {
             let (by_s, height) = minimum(&all);
-            // Jackknife over recordings.
+            // The interval is a jackknife over the recordings.
             let n = recordings.len() as f64;
             let others: Vec<f64> =
                 recordings.iter().map(|r| minimum(&total_residual(&left, Some(&r.name))).0).collect();
@@ -93,13 +90,14 @@ pub fn detect_lag(recordings: &[&SegmentedRecording]) -> Option<DetectedLag> {
         })
 }
 
-/// Per length of [`BUILD_UP_LENGTHS`] and per delay or lag: samples times the logarithm of the mean square residual.
+/// Objective of one corner per length of [`BUILD_UP_LENGTHS`] and per delay or lag: number of samples times the logarithm of the mean
+/// square residual.
 struct CornerResiduals {
     name: String,
     by: [Vec<f64>; 5],
 }
 
-/// Sum over corners and recordings without `but`; each kind of corner at its best length.
+/// Sum of the objective over corners and recordings except `but`, with each kind of corner at its best length.
 fn total_residual(left: &[Vec<CornerResiduals>], but: Option<&str>) -> Vec<f64> {
     let at = |kind: &[CornerResiduals], k: usize| {
         let of = |d: usize| -> f64 {
@@ -110,7 +108,7 @@ fn total_residual(left: &[Vec<CornerResiduals>], but: Option<&str>) -> Vec<f64> 
     (0..left[0][0].by[0].len()).map(|k| left.iter().map(|kind| at(kind, k)).sum()).collect()
 }
 
-/// Position (s) and value of the minimum of a curve sampled at [`STEP_S`], by a parabola.
+/// Position (s) and value of the minimum of a curve sampled at [`STEP_S`], refined by a parabola.
 fn minimum(curve: &[f64]) -> (f64, f64) {
     let k = (0..curve.len()).min_by(|a, b| curve[*a].total_cmp(&curve[*b])).unwrap_or(0);
     let mut at = k as f64;
@@ -162,7 +160,7 @@ impl<'a> Corner<'a> {
             };
         let first = r.time_s.partition_point(|t| *t < from_s);
         let end = r.time_s.partition_point(|t| *t < to_s);
-        // A delayed rupture inside the window happened elsewhere.
+        // A rupture inside the window would disturb the fit, also one that appears delayed.
         let torn = run.ruptures_s.iter().any(|t| (from_s - MAX_LAG_S..to_s).contains(t));
         let turned_m = r.position_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         (alone && !torn && end - first > 4 * REGRESSORS).then(|| Self {
@@ -177,7 +175,7 @@ impl<'a> Corner<'a> {
         })
     }
 
-    /// Residuals for all lengths and all delays or lags.
+    /// Objective for all lengths and all delays or lags.
     fn residuals(&self, how: LagModel) -> CornerResiduals {
         let n = self.time_s.len() as f64;
         let by = BUILD_UP_LENGTHS[self.at as usize].map(|delta| {
@@ -194,7 +192,7 @@ impl<'a> Corner<'a> {
             LagModel::LowPass => (0.0, by_s),
         };
         let (time, z) = (&self.recording.time_s, &self.recording.position_m);
-        // The filter starts early enough to forget its initial state.
+        // The filter starts early enough to lose its initial state.
         let from = time.partition_point(|t| *t < self.time_s[0] - FILTER_MEMORY * lag_s);
         let mut slow = [z[from], 0.0, 0.0];
         let mut rows: Vec<[f64; REGRESSORS]> = Vec::with_capacity(self.time_s.len());
@@ -206,13 +204,13 @@ impl<'a> Corner<'a> {
                 CornerKind::Reversal if at_s < self.at_s - STANDSTILL_S => 0.0,
                 CornerKind::Reversal => (self.turned_m - at_m).max(0.0),
             };
-            // Without a lag the filter passes its input.
+            // Without a lag the share is one.
             let share = if i == from { 1.0 } else { 1.0 - libm::exp(-(time[i] - time[i - 1]) / lag_s) };
             for (s, x) in slow.iter_mut().zip([at_m, u / delta, 1.0 - libm::exp(-u / delta)]) {
                 *s += (x - *s) * share;
             }
             if i >= self.first {
-                // Up to the stop the regressor is the position; before the reversal it is time.
+                // Regressor before the corner: position at the stop, time at the reversal.
                 let before = if self.at == CornerKind::Stop {
                     1e3 * (slow[0] - self.turned_m)
                 } else {
@@ -225,7 +223,7 @@ impl<'a> Corner<'a> {
     }
 }
 
-/// Columns of the regression.
+/// Number of regressors.
 const REGRESSORS: usize = 4;
 
 #[cfg(test)]
