@@ -288,9 +288,9 @@ impl Default for GuardConfig {
 pub enum Algorithm {
     /// The paper's algorithm with the completions \[D\].
     Paper,
-    /// The paper's algorithm as printed: no blind travel after contact, no motion guards, drop by extremes. At 20 mN of
-    /// noise and with contact detected in the data nearly every insertion has a false rupture right after contact, and with
-    /// the sinusoid from rest the first layer's `K` is off by half (`tests/detection_over_noise_seeds.rs`).
+    /// The paper's algorithm as printed: no blind travel after contact, no motion guards, drop by extremes. At 20 mN of noise and with
+    /// contact detected in the data nearly every insertion has a false rupture right after contact, and with the sinusoid from rest the
+    /// first layer's `K` is off by half (`tests/detection_over_noise_seeds.rs`).
     Literal,
     /// Kalman filters with calibrated intervals, see [`StyletConfig`]. It has the multi-layer model only and detects layers
     /// itself: with [`Model::KelvinVoigt`] or [`Depths::Known`] the paper's algorithm runs instead.
@@ -298,8 +298,8 @@ pub enum Algorithm {
     Stylet,
 }
 
-/// Law of the shaft friction `D u` that [`Algorithm::Stylet`] subtracts. The law defines the drive `u` (m/s); the cumulative
-/// friction `D` (N s/m) is estimated.
+/// Law of the shaft friction `D u` that [`Algorithm::Stylet`] subtracts. The law defines the drive `u` (m/s); the cumulative friction
+/// `D` (N s/m) is estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -336,11 +336,11 @@ pub struct StyletConfig {
     pub min_drop_share: f64,
     /// Law of the shaft friction.
     pub friction_law: FrictionLaw,
-    /// If true, slow changes of the force during retraction are attributed to friction; if false, friction keeps the value
-    /// estimated during insertion.
+    /// If true, slow changes of the force during retraction are attributed to friction; if false, friction keeps the value estimated
+    /// during insertion.
     pub track_retraction: bool,
-    /// True if velocities are derived from positions by a causal filter instead of measured. They show a stop one sample
-    /// late, so a force drop that may be lost friction is declared a rupture only after the next position.
+    /// True if velocities are derived from positions by a causal filter instead of measured. They show a stop one sample late, so a
+    /// force drop that may be lost friction is declared a rupture only after the next position.
     pub derived_velocity: bool,
 }
 

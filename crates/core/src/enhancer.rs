@@ -30,14 +30,14 @@ pub struct Enhancer<B> {
 }
 
 impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
-    /// Creates an enhancer with `storage` for the raw samples of a layer. `surface_m` is the position of the tissue surface,
-    /// used with [`Contact::Known`](crate::config::Contact::Known).
+    /// Creates an enhancer with `storage` for the raw samples of a layer. `surface_m` is the position of the tissue surface, used
+    /// with [`Contact::Known`](crate::config::Contact::Known).
     pub fn new(config: EnhanceConfig, surface_m: f64, storage: B) -> Self {
         Self::with_units(config, surface_m, Units::default(), storage)
     }
 
-    /// As [`Enhancer::new`] for needles or forces of another scale: lengths and forces in `config` and in the internal
-    /// constants are in `units`; samples, surface and outputs are in m and N.
+    /// As [`Enhancer::new`] for needles or forces of another scale: lengths and forces in `config` and in the internal constants
+    /// are in `units`; samples, surface and outputs are in m and N.
     pub fn with_units(config: EnhanceConfig, surface_m: f64, units: Units, storage: B) -> Self {
         let surface_m = surface_m / units.length_m;
         let kalman =
@@ -61,9 +61,9 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     /// Processes one sample. A sample that is not finite, out of range, or not later than the previous one is ignored
     /// ([`Output::used`] is false, [`Output::unused_reason`] says why).
     ///
-    /// A time stamp that jumps back by 1 s or more, or ahead by more than 1 s, is ignored until five consecutive samples
-    /// confirm it. A confirmed jump ahead of up to ten minutes is a pause and is processed as a long interval; any other is
-    /// a new clock and re-initialises the algorithm ([`Output::restarted`]).
+    /// A time stamp that jumps back by 1 s or more, or ahead by more than 1 s, is ignored until five consecutive samples confirm
+    /// it. A confirmed jump ahead of up to ten minutes is a pause and is processed as a long interval; any other is a new clock
+    /// and re-initialises the algorithm ([`Output::restarted`]).
     #[inline]
     pub fn step(&mut self, sample: Sample) -> Output {
         if !self.units.are_si() {
@@ -195,11 +195,11 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         }
     }
 
-    /// Enhanced force of the last sample in N and its 95 % band, with the shaft friction `friction_n` of an identified model
-    /// in place of the core's own estimate. Call it once after every [`Enhancer::step`]; the model should count a layer as
-    /// punctured from the sample at which the core declared its rupture. During retraction `Stylet` corrects the model by
-    /// the measured force ([`StyletConfig::track_retraction`](crate::config::StyletConfig::track_retraction)). `None` with
-    /// the other algorithms.
+    /// Enhanced force of the last sample in N and its 95 % band, with the shaft friction `friction_n` of an identified model in
+    /// place of the core's own estimate. Call it once after every [`Enhancer::step`]; the model should count a layer as punctured
+    /// from the sample at which the core declared its rupture. During retraction `Stylet` corrects the model by the measured
+    /// force ([`StyletConfig::track_retraction`](crate::config::StyletConfig::track_retraction)). `None` with the other
+    /// algorithms.
     pub fn apply_model_friction(&mut self, friction_n: f64) -> Option<(f64, [f64; 2])> {
         let config = self.paper.config();
         let unit_n = self.units.force_n;

@@ -221,8 +221,8 @@ impl BaselineKind {
     }
 }
 
-/// Baseline of the force as estimated by `Stylet`: `f = offset + drift (t - t_now) + line (z - z_now)`. Standard deviations
-/// are zero where no estimate exists.
+/// Baseline of the force as estimated by `Stylet`: `f = offset + drift (t - t_now) + line (z - z_now)`. Standard deviations are
+/// zero where no estimate exists.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Baseline {

@@ -1,5 +1,5 @@
-//! Internal units of length and force. The core's constants are made for insertions of centimetres and forces of newtons;
-//! recordings of another scale are converted to units in which they have these magnitudes.
+//! Internal units of length and force. The core's constants are made for insertions of centimetres and forces of newtons; recordings
+//! of another scale are converted to units in which they have these magnitudes.
 
 use crate::sample::{Baseline, Detection, LayerEstimate, Output, Sample, ZeroStep};
 

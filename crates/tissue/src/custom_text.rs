@@ -165,8 +165,8 @@ mod named_list_serde {
         }
     }
 
-    /// A key without quotes. Formats write the names of variants so, and those live as long as the program; the same holds
-    /// for the names of definitions.
+    /// A key written without quotes, as formats write the names of variants. Such names have static lifetime, as those of
+    /// definitions have.
     struct Key(&'static str);
 
     impl Serialize for Key {

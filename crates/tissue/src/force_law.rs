@@ -191,8 +191,8 @@ impl ForceLaw {
     /// that becomes active in this step.
     ///
     /// For fitting: with ruptures imposed where the measured data show them, the force is smooth in nearly every parameter,
-    /// and the criterion tells how far the force law is from rupturing there by itself. With the law's own ruptures
-    /// imposed, the result is bit for bit that of [`ForceLaw::step`].
+    /// and the criterion shows how far the force law is from rupturing there by itself. With the law's own ruptures imposed,
+    /// the result is bit for bit that of [`ForceLaw::step`].
     #[inline]
     pub fn step_imposed(
         &self,

@@ -14,8 +14,8 @@ const DECISION_NATS: f64 = 2.0;
 const SETTLED_NATS: f64 = 10.0;
 
 impl KalmanEnhancer {
-    /// Evaluates the hypotheses in air whenever the number of samples has grown by a quarter or the force leaves the
-    /// baseline (`away`: 1 above it, -1 below). Returns the evidence when a contact has begun.
+    /// Evaluates the hypotheses in air whenever the number of samples has grown by a quarter or the force leaves the baseline
+    /// (`away`: 1 above it, -1 below). Returns the evidence when a contact has begun.
     pub(super) fn look_at_air(&mut self, sample: &Sample, away: i8) -> Option<AirEvidence> {
         let due = self.baseline.history.samples >= self.baseline.next_evaluation;
         if !due && away == 0 || self.baseline.history.samples < MIN_SAMPLES {
@@ -122,8 +122,8 @@ impl KalmanEnhancer {
         self.free_tip.restart_from(&self.estimator);
     }
 
-    /// Re-evaluates a contact that is not final, with the sample added to the history in air. Cancels the contact if a
-    /// moving baseline or a step of the zero is more probable.
+    /// Re-evaluates a contact that is not final, with the sample added to the history in air. Cancels the contact if a moving
+    /// baseline or a step of the zero is more probable.
     #[cold]
     pub(super) fn verify_evidence(&mut self, config: &EnhanceConfig, sample: &Sample) {
         if config.contact != Contact::Detected || self.estimator.passed_count > 0 {

@@ -1,5 +1,5 @@
-//! Hypotheses on the force in air: an offset that may drift in time, change with position (a cable, a guide, the weight of a
-//! tilted tool) or jump (a tare), and a contact, a *bend* of the force that none of these explains.
+//! Hypotheses on the force in air: an offset that may drift in time, change with position (a cable, a guide, the weight of a tilted
+//! tool) or jump (a tare), and a contact, a *bend* of the force that none of these explains.
 //!
 //! The samples since the start are kept as block averages of growing length: eight single samples, then four blocks of two,
 //! of four, and so on, and a dozen equally long ones for everything older. [`AirHistory::evaluate`] compares,
@@ -9,9 +9,9 @@
 //! f = c,   f = c + d t,   f = c + g z
 //! ```
 //!
-//! each alone, with a step of the zero at any block, and with a bend `s (z - z_c)` from any block on. The noise of a block
-//! average follows from the differences of neighbouring samples, which no baseline changes; if the best hypothesis leaves a
-//! larger residual variance, all log evidence is divided by the ratio.
+//! each alone, with a step of the zero at any block, and with a bend `s (z - z_c)` from any block on. The noise of a block average
+//! follows from the differences of neighbouring samples, which no baseline changes; if the best hypothesis leaves a larger residual
+//! variance, all log evidence is divided by the ratio.
 
 pub(super) use super::air_sums::Form;
 use super::air_sums::{Block, MIN_REMAINING_SHARE, Suffix, Totals};
@@ -51,8 +51,8 @@ const INSEPARABLE: f64 = 0.99;
 const NAMING_NATS: f64 = 3.0;
 /// Smallest step of the zero in standard deviations of the noise, so that it is visible between two samples.
 const MIN_STEP_SDS: f64 = 5.0;
-/// Longest blocks between which a step is searched, in samples (longer ones do not distinguish a step from a ramp), and the
-/// smallest share of the step that lies between them.
+/// Longest blocks between which a step is searched, in samples (longer ones do not distinguish a step from a ramp), and the smallest
+/// share of the step that lies between them.
 const MAX_JUMP_SAMPLES: f64 = 2.0;
 pub(super) const MIN_JUMP_SHARE: f64 = 0.6;
 /// Multiplications and additions of an evaluation per block.
@@ -214,8 +214,8 @@ impl AirHistory {
         self.take(sample, true);
     }
 
-    /// Adds a sample that may be in tissue, where the force changes by more than the noise; it does not update a noise level
-    /// that is known.
+    /// Adds a sample that may be in tissue, where the force changes by more than the noise; it does not update a noise level that is
+    /// known.
     pub(super) fn push_doubtful(&mut self, sample: &Sample) {
         let rho = self.rho();
         let is_known = self.samples * (1.0 - rho) >= MIN_FOR_NOISE * (1.0 + rho);
@@ -489,8 +489,8 @@ impl AirHistory {
         fit
     }
 
-    /// Joint least-squares fit of level, drift and line. Each slope has a prior of the size of the whole change, so that at
-    /// constant speed, where both are collinear, each gets half of it.
+    /// Joint least-squares fit of level, drift and line. Each slope has a prior of the size of the whole change, so that at constant
+    /// speed, where both are collinear, each gets half of it.
     fn fit(&self, evidence: &AirEvidence, total: &Totals, form: Form, at: &Sample) -> BaselineFit {
         // Sums in units of the noise variance with its excess.
         let scale = 1.0 / evidence.excess;

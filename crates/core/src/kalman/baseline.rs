@@ -1,5 +1,5 @@
-//! Baseline in air: its history, the part subtracted from the force, and the state of the decisions on contact and steps of
-//! the zero.
+//! Baseline in air: its history, the part subtracted from the force, and the state of the decisions on contact and steps of the
+//! zero.
 
 use super::air_history::{AirHistory, BaselineFit};
 use super::gaussian::at_least;

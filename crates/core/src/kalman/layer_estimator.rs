@@ -74,8 +74,8 @@ pub(crate) struct LayerEstimator {
 pub(crate) type PassedLayers = [[f64; 3]; MAX_LAYERS];
 
 impl LayerEstimator {
-    /// Initial state at a contact at `start_m`, where a force `force_n` with standard deviation `sd_n` already acts. The
-    /// priors of stiffness and friction have the scale `slope` in N/m.
+    /// Initial state at a contact at `start_m`, where a force `force_n` with standard deviation `sd_n` acts; `slope` in N/m is the
+    /// scale of the priors of stiffness and friction.
     pub(crate) fn at_contact(
         start_m: f64,
         force_n: f64,
@@ -123,8 +123,7 @@ impl LayerEstimator {
         }
     }
 
-    /// Makes drift and line unknowns, with the covariance of `fit`; their fitted values are subtracted from the force from
-    /// here on.
+    /// Makes drift and line unknowns, with the covariance of `fit`; their fitted values are subtracted from the force from here on.
     pub(super) fn set_baseline(&mut self, fit: &BaselineFit, noise: &NoiseEstimator) {
         let unit = 1.0 / noise.variance;
         let g = &mut self.belief;
@@ -262,8 +261,8 @@ impl LayerEstimator {
         self.belief.x[K] + self.belief.x[B] * drive
     }
 
-    /// Penalty in nats for negative stiffness or friction of the active and the previous layer: about minus the log
-    /// probability that they are positive.
+    /// Penalty in nats for negative stiffness or friction of the active and the previous layer: about minus the log probability that
+    /// they are positive.
     pub(super) fn negative_nats(&self, noise: &NoiseEstimator) -> f64 {
         let g = &self.belief;
         let one = |i: usize| {
@@ -348,8 +347,8 @@ impl LayerEstimator {
             [self.log_density_of_free(true, noise), self.log_density_of_free(false, noise)];
     }
 
-    /// Reverts the free-tip assumption after a force drop, which shows that there was a layer: moves half of the slope, with
-    /// that much uncertainty, from friction to stiffness.
+    /// Reverts the free-tip assumption when a force drop shows a layer: moves half of the slope, with that sd, from friction to
+    /// stiffness.
     pub(super) fn reopen_split(&mut self, drive: f64, unit: f64) {
         let widest = max_slope(unit);
         let half = (0.5 * self.slope(drive)).clamp(-widest, widest);
@@ -499,7 +498,7 @@ impl LayerEstimator {
         total * share
     }
 
-    /// Log density of the state, up to a constant, at `K = 0` and `b = b'` (`follows`) or `b = 0`.
+    /// Log density of the state at `K = 0` and `b = b'` (`follows`) or `b = 0`.
     pub(super) fn log_density_of_free(&self, follows: bool, noise: &NoiseEstimator) -> f64 {
         let g = &self.belief;
         let (mut b, mut vb, mut cov) = (g.x[B], g.p[B][B], g.cov(B, K));

@@ -12,9 +12,8 @@ use super::zero_step_state::{Jump, Rival};
 use crate::config::EnhanceConfig;
 use crate::sample::{Output, Sample};
 
-/// Largest misfit (mean squared standardised innovation) at which the layer estimator feeds the CUSUMs. An excess over 1
-/// that was all a constant offset (0.45 standard deviations) would not make them drift: they are tuned to shifts of 1 or
-/// more.
+/// Largest misfit (mean squared standardised innovation) at which the layer estimator feeds the CUSUMs. Even if its excess
+/// over 1 is a constant offset, 0.45 standard deviations, they do not drift.
 pub(super) const MAX_ALARM_MISFIT: f64 = 1.2;
 /// Prior standard deviation of an unknown slope in N/m: that of the stiffest tissue.
 pub(super) const MAX_STIFFNESS_N_PER_M: f64 = 2000.0;
@@ -22,8 +21,7 @@ pub(super) const MAX_STIFFNESS_N_PER_M: f64 = 2000.0;
 pub(super) const OPERATIONS_PER_RUPTURE: u32 = 2 * 216 + 2 * 126 + 2 * 84;
 /// Longest duration of an ordinary drop, in s.
 pub(super) const MAX_DROP_DURATION_S: f64 = 0.1;
-/// Misfit from which the base law is rejected; also the initial value, so that the law is used only after it has fitted
-/// data.
+/// Misfit from which the base law is rejected; also the initial value, so that the law is used only after it has fitted data.
 pub(super) const FAILED_MISFIT: f64 = 3.0;
 
 #[derive(Clone, Copy, Debug)]

@@ -28,9 +28,8 @@ pub(crate) const REST_SPEED_MPS: f64 = 1e-5;
 const STEP_NOISE_RATIO: f64 = 0.1;
 const EXTRAPOLATED_NOISE_RATIO: f64 = 3.25;
 
-/// Encoder detection: smallest change of the travel from step to step that is not a rounding error, in m; largest error of a
-/// travel in encoder steps (half a step at either end, and an error of the log); number of changes by one step that confirm
-/// an encoder.
+/// Encoder detection: smallest change of the travel from step to step that is not a rounding error, in m; largest error of a travel in
+/// encoder steps (half a step at either end, and an error of the log); number of changes by one step that confirm an encoder.
 const MIN_ENCODER_STEP_M: f64 = 1e-12;
 const ENCODER_STEPS: f64 = 1.5;
 const MIN_SIGHTINGS: u8 = 4;
@@ -44,8 +43,7 @@ pub(crate) struct VelocityEstimator {
     usual: f64,
     noise: f64,
     logged_mps: f64,
-    /// Travel of the last step in m, its smallest change so far (the encoder step, if there is one), and how often that
-    /// change occurred.
+    /// Travel of the last step in m, its smallest change so far (the encoder step, if there is one), and how often that change occurred.
     moved_m: f64,
     encoder_step_m: f64,
     sightings: u8,
@@ -158,8 +156,8 @@ impl VelocityEstimator {
         if self.sightings == MIN_SIGHTINGS { self.encoder_step_m } else { 0.0 }
     }
 
-    /// Updates the encoder step: travels of a rounded position differ by multiples of it, those of an exact one by
-    /// arbitrarily small amounts.
+    /// Updates the encoder step: travels of a rounded position differ by multiples of it, those of an exact one by arbitrarily small
+    /// amounts.
     #[inline(always)]
     fn look_for_encoder_step(&mut self, moved_m: f64) {
         let change_m = (moved_m - core::mem::replace(&mut self.moved_m, moved_m)).abs();
@@ -180,8 +178,8 @@ impl VelocityEstimator {
         self.accurate_positions && self.smoothed_log
     }
 
-    /// Noise variance in (m/s)² estimated from this step, and velocity from the positions. Sets `jumped` if the squared
-    /// second difference exceeds `limit`.
+    /// Noise variance in (m/s)² estimated from this step, and velocity from the positions. Sets `jumped` if the squared second
+    /// difference exceeds `limit`.
     fn velocity_from_positions(&mut self, limit: f64) -> (f64, f64) {
         let [now, last, before] = self.step_mps;
         let (change, previous_change) = (now - last, last - before);
@@ -193,8 +191,8 @@ impl VelocityEstimator {
         (STEP_NOISE_RATIO * second_difference, if smooth { now + 0.5 * change } else { now })
     }
 
-    /// Velocity when log and positions disagree: the log, if a jump within the step explains the mean velocity (which then
-    /// lies between the logged ones); otherwise the mean velocity.
+    /// Velocity when log and positions disagree: the log, if a jump within the step explains the mean velocity (which then lies between
+    /// the logged ones); otherwise the mean velocity.
     #[cold]
     fn resolve_disagreement(&mut self, before: f64, logged: f64, step: f64, limit: f64) -> (f64, bool) {
         let between = at_most(logged.max(before), at_least(logged.min(before), step));

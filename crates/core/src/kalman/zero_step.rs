@@ -1,7 +1,7 @@
-//! Steps of the sensor's zero while the needle is in tissue. At a rupture the force drops by at most the elastic force, and
-//! another layer follows. A jump between two samples that goes up, or drops further than a rupture can, is accepted as a
-//! step of the zero at once. A drop that may be a rupture is declared as one; where the base law holds, a rival estimator
-//! assumes the old layer with another zero. If the rival predicts the force better, the rupture is withdrawn.
+//! Steps of the sensor's zero while the needle is in tissue. At a rupture the force drops by at most the elastic force, and another
+//! layer follows. A jump between two samples that goes up, or drops further than a rupture can, is accepted as a step of the zero at
+//! once. A drop that may be a rupture is declared as one; where the base law holds, a rival estimator assumes the old layer with
+//! another zero. If the rival predicts the force better, the rupture is withdrawn.
 
 use super::air_history::MIN_JUMP_SHARE;
 use super::gaussian::{at_least, at_most};
@@ -12,8 +12,7 @@ use crate::sample::{Sample, ZeroStep};
 
 /// Number of samples over which a jump must last and be level.
 const LASTING_SAMPLES: u8 = 3;
-/// Largest change of the deviation within them, as a share of the jump; if loading is faster than predicted, the deviation
-/// grows.
+/// Largest change of the deviation within them, as a share of the jump; if loading is faster than predicted, the deviation grows.
 const MAX_GROWTH_SHARE: f64 = 0.3;
 /// Smallest jump in standard deviations of the noise.
 const MIN_JUMP_SDS: f64 = 5.0;
@@ -97,8 +96,7 @@ impl KalmanEnhancer {
         bias + at_least(0.0, least * self.friction_drive_mps)
     }
 
-    /// Rival of the rupture about to be declared, from the estimator before the drop. `None` if a step of the zero is
-    /// excluded.
+    /// Rival of the rupture about to be declared, from the estimator before the drop. `None` if a step of the zero is excluded.
     pub(super) fn rival_of_rupture(&self, sample: &Sample) -> Option<Rival> {
         let candidate = self.candidate?;
         if self.misfit_weight > 0.0 || candidate.count > JUMP_SAMPLES || self.snapshot.tip_free {
@@ -165,8 +163,8 @@ impl KalmanEnhancer {
         false
     }
 
-    /// Decides on the last rupture when another follows. The new drop shows how much of the force was elastic, and so the
-    /// friction under either explanation; the last rupture is withdrawn if its friction would be negative.
+    /// Decides on the last rupture when another follows. The new drop shows how much of the force was elastic, and so the friction
+    /// under either explanation; the last rupture is withdrawn if its friction would be negative.
     pub(super) fn decide_rival_at_rupture(&mut self, sample: &Sample, rupture_m: f64) {
         let Some(rival) = self.rival else { return };
         let negative_nats = |mut estimator: LayerEstimator| {
