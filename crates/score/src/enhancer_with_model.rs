@@ -51,7 +51,7 @@ pub struct RecordingScale {
 }
 
 impl RecordingScale {
-    /// Takes a sample; values that are not finite do not count.
+    /// Adds a sample; values that are not finite are ignored.
     pub fn push(&mut self, position_m: f64, force_n: f64) {
         if !(position_m.is_finite() && force_n.is_finite()) {
             return;
@@ -64,7 +64,7 @@ impl RecordingScale {
         self.span_m = [self.span_m[0].min(position_m), self.span_m[1].max(position_m)];
     }
 
-    /// Units that fit.
+    /// Internal units for this scale.
     #[must_use]
     pub fn units(&self) -> Units {
         Units::for_extent(self.span_m[1] - self.span_m[0], self.change_n)

@@ -210,7 +210,7 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
 /// Largest force in N of a simulation with custom effects; beyond it the physics engine loses precision.
 const MAX_FORCE_N: f64 = 1e6;
 
-/// Replays the motion with effects that are not in the library, whose forces may have no value.
+/// Replays the motion with custom effects, to check that their forces are finite.
 fn check_custom_effects(
     scenario: &Scenario,
     plan: &MotionPlan,

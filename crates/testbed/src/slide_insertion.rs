@@ -61,7 +61,7 @@ pub(crate) struct InstantVelocity {
 }
 
 impl InstantVelocity {
-    /// At the first instant, where the body moves as commanded.
+    /// State at the first sample, where the body moves as commanded.
     pub(crate) fn new(start: MotionPoint, dt_s: f64) -> Self {
         let mean_mps = start.velocity_mps;
         Self { commanded: start, mean_mps, deviation_mps: 0.0, dt_s }

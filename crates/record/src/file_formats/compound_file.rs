@@ -1,5 +1,4 @@
-//! Soundness of compound files, the container of xls: a damaged chain of sectors that ends in a circle would be followed for
-//! ever.
+//! Check of compound files, the container of xls, for cyclic chains of sectors, in which a reader would loop for ever.
 
 /// Sector numbers from here on end a chain or mark free sectors.
 const FIRST_SPECIAL: u32 = 0xFFFF_FFFA;

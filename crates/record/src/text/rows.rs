@@ -29,7 +29,7 @@ pub(crate) struct MissingValue {
     pub text: String,
 }
 
-/// What was noticed while reading.
+/// Findings while reading rows.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct RowsRead {
     pub rows: usize,
@@ -55,7 +55,7 @@ pub(crate) struct BadValues {
     pub first: std::sync::Arc<RecordError>,
 }
 
-/// What happens to rows that are wrong.
+/// Handling of invalid rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Tolerance {
     /// They are errors.
@@ -64,9 +64,9 @@ pub(crate) enum Tolerance {
     Lenient,
 }
 
-/// Digits from which on an integer loses some as a number.
+/// Digits from which an integer is not exact as an `f64`.
 const LARGE_DIGITS: usize = 16;
-/// Least rows before a last row that is cut short and left out.
+/// Fewest rows before a truncated last row for leaving it out.
 const MIN_ROWS_BEFORE_CUT: usize = 3;
 
 /// Records with one delimiter.
@@ -144,7 +144,7 @@ pub(crate) fn read_rows(
     let mut row = csv::ByteRecord::new();
     let mut numbers = vec![0.0; wanted.len()];
     let mut read = RowsRead { origins: vec![None; wanted.len()], ..RowsRead::default() };
-    // Errors about lines that are passed over are made at the end: finding a line number reads the file from its beginning.
+    // Errors about skipped lines are created at the end, because finding a line number reads the file from its beginning.
     let mut short: Option<Ragged> = None;
     let mut ragged: Option<(usize, Ragged)> = None;
     let mut bad: Vec<(usize, usize, MissingValue)> = Vec::new();
