@@ -2,7 +2,7 @@
 
 use crate::chart_model::Chart;
 
-/// Judgement of a value. Drawn as a colour and a sign, so that it does not depend on colour vision.
+/// Rating of a value, drawn as a colour and a sign, so that it does not depend on colour vision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Status {
     /// Not judged.
@@ -44,7 +44,7 @@ impl Status {
 /// One figure of a scorecard.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
-    /// What it is.
+    /// Label.
     pub label: String,
     /// The figure, with unit.
     pub value: String,
