@@ -139,7 +139,7 @@ pub fn read_all_shards(sweep: &Sweep, columns: &Columns, out: &Path) -> Result<D
     all.finish()
 }
 
-/// Writes the results into the locked folder `out` and removes the shards, but no other files beside them.
+/// Writes the results into the locked folder `out` and removes the shards, but no other files.
 ///
 /// # Errors
 /// [`Error::Output`].

@@ -59,7 +59,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// Processes one sample. A sample that is not finite, out of range, or not later than the previous one is ignored
-    /// ([`Output::used`] is false, [`Output::unused_reason`] says why).
+    /// ([`Output::used`] is false; see [`Output::unused_reason`]).
     ///
     /// A time stamp that jumps back by 1 s or more, or ahead by more than 1 s, is ignored until five consecutive samples confirm
     /// it. A confirmed jump ahead of up to ten minutes is a pause and is processed as a long interval; any other is a new clock

@@ -240,7 +240,7 @@ pub struct Baseline {
     pub zero_steps: usize,
 }
 
-/// A step of the sensor's zero (a tare, a slipping amplifier): a jump between two samples that is no rupture.
+/// A step of the sensor's zero (a tare, a slipping amplifier): a jump between two samples that is not a rupture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ZeroStep {

@@ -15,7 +15,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use stylet_stats::parallel::*;
 
-/// The answer key: the case behind each number.
+/// The answer key: the case of each number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AnswerKey {
     /// Version of the case generator ([`GENERATOR_VERSION`]).

@@ -246,7 +246,7 @@ pub(crate) fn unit_of(head: TableHead<'_>, index: usize) -> Option<Unit> {
     head.units.get(index).copied().flatten().or_else(|| split_name(head.names.get(index)?).unit)
 }
 
-/// A column with the unit that the file says, where it is one of the quantity.
+/// A column with the unit in the file, if it is a unit of the quantity.
 fn mapped(head: TableHead<'_>, role: ColumnRole, indices: Vec<usize>, column: &Column) -> MappedColumn {
     let first = indices.first().copied().unwrap_or(0);
     let kind = head.kinds.get(first).copied().unwrap_or(ColumnKind::Number);
@@ -299,7 +299,7 @@ fn given(
         match place(head, name.trim())? {
             Some(index) => indices.push(index),
             None => {
-                // `wrench` stands for `wrench.1`, `wrench.2`, `wrench.3`.
+                // `wrench` denotes `wrench.1`, `wrench.2`, `wrench.3`.
                 let parts: Vec<usize> = (1..=4)
                     .filter_map(|k| head.names.iter().position(|n| *n == format!("{}.{k}", name.trim())))
                     .collect();

@@ -73,9 +73,9 @@ impl RecordingScale {
 
 /// An online core, and optionally a model that gives the shaft friction.
 ///
-/// The model maps a sample and the number of ruptures that the core has declared so far to the friction in N. Ruptures come
-/// from the core, not from the model: their places differ by millimetres between insertions, the friction behind begins
-/// there, and the core detects them within samples.
+/// The model maps a sample and the number of ruptures that the core has declared so far to the friction in N. Ruptures come from
+/// the core, not from the model: their positions differ by millimetres between insertions, friction changes there, and the core
+/// detects them within samples.
 pub struct EnhancerWithModel<M> {
     core: Enhancer<Vec<Sample>>,
     model: Option<M>,

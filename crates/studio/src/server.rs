@@ -1,8 +1,8 @@
 //! The local server: one page, the messages of [`Studio`], uploads, and the result files of the workspace.
 //!
 //! It listens on the loopback interface only. Every address begins with a random token; `Host` and `Origin` must be the server's own. The
-//! page may load nothing but its own files, and no inline script. Connections, request bodies and waiting times are bounded. Uploads go to
-//! a temporary folder, which is removed at the end.
+//! page may load only its own files, and no inline script. Connections, request bodies and waiting times are bounded. Uploads go to a
+//! temporary folder, which is removed at the end.
 
 use crate::http::{Access, HttpServer, Limits, plain, respond, with_policy};
 use crate::messages::Problem;

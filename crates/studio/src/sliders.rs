@@ -111,8 +111,7 @@ impl Scale {
 
     /// The SI value of a target; `None` where the number is absent.
     ///
-    /// # Errors
-    /// When a text is no number, or the number must not be absent.
+    /// # Errors When a text is not a number, or the number must not be absent.
     pub fn value(&self, to: &Target) -> Result<Option<f64>, Problem> {
         match to {
             Target::Position(position) if self.optional && *position >= self.values.len() => Ok(None),

@@ -12,7 +12,7 @@ use stylet_tissue::{AnyEffect, ChainStage, Effect, ForceLaw, Rupture, Slab, TooM
 /// Error of a simulation.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulateError {
-    /// `motion: Recorded` has no motion of its own.
+    /// `motion: Recorded` does not define a motion.
     #[error(
         "the motion is `Recorded`: it comes with measured data; give the scenario a motion to simulate it"
     )]
@@ -131,8 +131,7 @@ pub fn sample_rates(scenario: &Scenario, duration_s: f64) -> SampleRates {
 
 /// Simulates a scenario with the noise of `seed`. The same scenario and seed give the same bits.
 ///
-/// # Errors
-/// [`SimulateError`] when the scenario has no motion of its own or cannot be simulated.
+/// # Errors [`SimulateError`] when the scenario does not define a motion or cannot be simulated.
 pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateError> {
     let plan = scenario.motion.plan().ok_or(SimulateError::NoMotion)?;
     let law = ForceLaw::new(&scenario.tissue, &scenario.effects)?;

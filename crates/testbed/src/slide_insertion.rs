@@ -47,10 +47,10 @@ pub fn simulate_replay(
     }
 }
 
-/// Velocity and acceleration of a body at the instant of its position.
+/// Velocity and acceleration of a body at the time of its position.
 ///
 /// rapier integrates by semi-implicit Euler: the velocity of a body is the mean over the step that ended, half a step earlier than its position. The
-/// drive's deviation from the commanded mean of that step is added to the command of the instant.
+/// drive's deviation from the commanded mean of that step is added to the commanded velocity at that time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct InstantVelocity {
     commanded: MotionPoint,
@@ -74,7 +74,7 @@ impl InstantVelocity {
         self.mean_mps
     }
 
-    /// Velocity (m/s) and acceleration (m/s²) at the instant, from the body's velocity over the step that ended.
+    /// Velocity (m/s) and acceleration (m/s²) at the end of the step, from the body's mean velocity over it.
     pub(crate) fn at_instant(&mut self, body_mps: f64) -> (f64, f64) {
         let deviation_mps = body_mps - self.mean_mps;
         let deviation_mps2 = (deviation_mps - self.deviation_mps) / self.dt_s;

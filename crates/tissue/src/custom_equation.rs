@@ -39,7 +39,7 @@ pub struct EquationSample {
     pub force_n: f64,
 }
 
-/// The equation of a custom effect. It has no state of its own: the same arguments give the same result.
+/// The equation of a custom effect. It is stateless: the same arguments give the same result.
 ///
 /// In a fit, a result that is not finite rejects the parameter values; in a simulation it is an error.
 pub trait Equation: Debug + Send + Sync {

@@ -66,7 +66,7 @@ pub struct ParameterText {
 }
 
 /// Where a parameter is expected. A search looks between the points that leave 2.5 % on either side. The prior of a parameter
-/// that is no strength also enters the fit.
+/// that is not a strength also enters the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Prior {

@@ -52,8 +52,7 @@ impl Printer {
 
     /// Waits for the last lines.
     ///
-    /// # Errors
-    /// [`Failure::Stdout`] when lines could not be printed; a reader that has closed the pipe is no error.
+    /// # Errors [`Failure::Stdout`] when lines could not be printed; a reader that has closed the pipe is not an error.
     pub fn finish(self, wait: Option<Duration>) -> Result<(), Failure> {
         match join(self.0, wait) {
             Some(Err(why)) if why.kind() != ErrorKind::BrokenPipe => Err(Failure::Stdout(why)),

@@ -95,7 +95,8 @@ fn interval(value: f64, sd: f64) -> [f64; 2] {
     [value - stylet_stats::Z95 * sd, value + stylet_stats::Z95 * sd]
 }
 
-/// Physically impossible values of an estimate (negative stiffness, friction or thickness), each with the reason.
+/// Physically impossible values of an estimate (negative stiffness or friction beyond the interval, layer thicker than 1 m),
+/// each with the reason.
 #[must_use]
 pub fn impossible(e: &LayerEstimate) -> Vec<String> {
     let mut out = Vec::new();

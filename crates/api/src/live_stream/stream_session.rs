@@ -21,7 +21,7 @@ pub struct StreamCounts {
     pub unused: u64,
     /// Restarts of the core because of a new clock.
     pub restarts: u64,
-    /// Lines that are no samples.
+    /// Lines that are not samples.
     pub bad_lines: u64,
     /// Ruptures declared, over all restarts.
     pub ruptures: u64,
@@ -43,7 +43,7 @@ pub struct StreamCounts {
 /// Message that the operator should see at once.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Report {
-    /// A line that is no sample.
+    /// A line that is not a sample.
     #[error("{0}")]
     Invalid(InvalidLine),
     /// The core ignored a sample.
@@ -86,7 +86,7 @@ struct OutputLine<'a> {
     layer: Option<LayerLine>,
     /// Restarts of the core because of a new clock, so far.
     restarts: u64,
-    /// Lines that are no samples, so far.
+    /// Lines that are not samples, so far.
     bad_lines: u64,
     dropped: u64,
 }

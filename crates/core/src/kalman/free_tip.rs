@@ -1,5 +1,5 @@
-//! Detection of a free tip. A layer that ruptures before its far face leaves a gap: until the next face, or for ever behind
-//! the last layer, nothing acts at the tip and the whole force is friction.
+//! Detection of a free tip. A layer that ruptures before its far face leaves a gap: until the next face, or permanently
+//! behind the last layer, no force acts at the tip and the whole force is friction.
 //!
 //! After a rupture the estimator assumes that the next layer begins at once. Two alternatives are nested in its law:
 //!

@@ -119,8 +119,8 @@ impl Retraction {
         if sample.track_retraction {
             return self.tracker.update(sample, travel, predicted);
         }
-        // No tip pushes during retraction: friction pulls no more than the force does, and less than predicted for a while
-        // afterwards.
+        // The tip cannot push during retraction: friction pulls at most as much as the force, and less than predicted for a
+        // while afterwards.
         self.reduction_n =
             (self.reduction_n * libm::exp(-travel / TRACKING_TRAVEL_M)).max(smoothed_n - predicted);
         (predicted + self.reduction_n, 0.25 * sample.peak_force_n)

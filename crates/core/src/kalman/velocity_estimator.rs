@@ -5,10 +5,10 @@
 //! encoder noise, `sqrt(2) sigma/dt`. The logged velocity is used as long as it agrees with `w` within four times their
 //! usual difference, and within the step of the encoder, which is the smallest change of the travel from step to step.
 //!
-//! The second difference of `w` is free of smooth motion; encoder noise gives it the variance `20 sigma²/dt²`, so that a
-//! tenth of its mean square is the noise variance of `w`. `w` extrapolated by half a step is the velocity at the sample,
-//! with variance `6.5 sigma²/dt²`. Where that is as accurate as a good log and the log has been found to be smoothed,
-//! positions alone are used from then on; a velocity jump is a second difference that stands out.
+//! The second difference of `w` is free of smooth motion; encoder noise gives it the variance `20 sigma²/dt²`, so that a tenth of its
+//! mean square is the noise variance of `w`. `w` extrapolated by half a step is the velocity at the sample, with variance
+//! `6.5 sigma²/dt²`. Where that is as accurate as a good log and the log has been found to be smoothed, positions alone are used from
+//! then on; a velocity jump is a second difference that is significant.
 
 use super::gaussian::{at_least, at_most};
 use crate::sample::Sample;

@@ -17,7 +17,7 @@ use stylet_stats::parallel::*;
 /// Version of the stream generator. Between versions the same identifier may denote different streams.
 const STREAM_VERSION: u32 = 1;
 
-/// The stream behind each number.
+/// Identifier of the stream of each number.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct StreamKey {
     stream_version: u32,

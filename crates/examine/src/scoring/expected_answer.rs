@@ -88,7 +88,7 @@ pub struct AnswerScore {
     pub correct: bool,
     /// A cause is named that is not present.
     pub wrong_name: bool,
-    /// Every expected cause is found, whatever else is named.
+    /// Every expected cause is found; others may be named as well.
     pub all_found: bool,
 }
 

@@ -28,7 +28,7 @@ fn check(bytes: &[u8]) -> Option<bool> {
         bytes.get(from..bytes.len().min(from + size))
     };
     let numbers = |data: &[u8]| (0..data.len() / 4).filter_map(|k| u32_at(data, 4 * k)).collect::<Vec<u32>>();
-    // Sectors of the allocation table: in the header, then in a chain of their own.
+    // Sectors of the allocation table: in the header, then in a separate chain.
     let mut table_sectors: Vec<u32> = (0..HEADER_ENTRIES).filter_map(|k| u32_at(bytes, 76 + 4 * k)).collect();
     let (mut next, mut steps) = (u32_at(bytes, 68)?, 0);
     while next < FIRST_SPECIAL {

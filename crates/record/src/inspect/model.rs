@@ -176,8 +176,7 @@ pub struct Candidate {
     pub certain: bool,
     /// Why.
     pub reason: String,
-    /// Units that the magnitude suggests, the most typical one first, where the file does not say the unit or says one that is
-    /// implausible.
+    /// Units that the magnitude suggests, the most typical one first, if the file has no unit or an implausible one.
     pub proposals: Vec<UnitProposal>,
 }
 

@@ -98,7 +98,7 @@ fn data_width(fields: &[String]) -> usize {
     fields.len() - usize::from(fields.len() > 1 && fields.last().is_some_and(String::is_empty))
 }
 
-/// Share of the fields of a row that are numbers, dates or missing; `None` when it is no row of data.
+/// Share of the fields of a row that are numbers, dates or missing; `None` when it is not a row of data.
 fn purity(fields: &[String]) -> Option<f64> {
     let (mut numbers, mut others) = (0, 0);
     for field in fields {

@@ -36,7 +36,7 @@ pub(crate) struct RowsRead {
     pub first_missing: Option<MissingValue>,
     /// Offset of a last row that is cut short.
     pub cut_row: Option<usize>,
-    /// Fields that are no numbers, by column; only with [`Tolerance::Lenient`].
+    /// Fields that are not numbers, by column; only with [`Tolerance::Lenient`].
     pub bad_values: Vec<BadValues>,
     /// Rows with another number of fields: how many, the line and the error of the first; only with [`Tolerance::Lenient`].
     pub ragged: Option<(usize, u64, std::sync::Arc<RecordError>)>,
@@ -44,7 +44,7 @@ pub(crate) struct RowsRead {
     pub origins: Vec<Option<i64>>,
 }
 
-/// Fields of a column that are no numbers.
+/// Fields of a column that are not numbers.
 #[derive(Debug, Clone)]
 pub(crate) struct BadValues {
     /// Which of the wanted fields.
@@ -60,7 +60,7 @@ pub(crate) struct BadValues {
 pub(crate) enum Tolerance {
     /// They are errors.
     Strict,
-    /// They are counted; a field that is no number is missing, a row with another number of fields is left out.
+    /// They are counted; a field that is not a number is missing, a row with another number of fields is left out.
     Lenient,
 }
 
@@ -246,7 +246,7 @@ impl Ragged {
     }
 }
 
-/// The value of a field, NaN when it is missing, `None` when it is no number.
+/// The value of a field, NaN when it is missing, `None` when it is not a number.
 #[inline]
 fn value(layout: &TextLayout, field: &WantedField, bytes: &[u8], origin: &mut Option<i64>) -> Option<f64> {
     // The whole text is UTF-8; a delimiter cannot split a character.

@@ -70,7 +70,7 @@ fn difference(samples: &Samples, weight: [f64; 2], weighting: Weighting) -> f64 
             }
         }
     }
-    // A diverged recursion counts as an infinite difference.
+    // A diverged recursion counts as a relative difference of one.
     if worst.is_finite() { worst } else { 1.0 }
 }
 

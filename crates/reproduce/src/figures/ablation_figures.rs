@@ -85,8 +85,8 @@ fn make(study: &Study, spec: &Spec) -> Result<Figure, ReproduceError> {
 /// Time in s after a true or declared rupture that is attributed to it.
 const AFTER_S: f64 = 1.0;
 
-/// Shares of the squared reconstruction error: shortly after a rupture, true or declared; otherwise before the last
-/// true one; otherwise behind it.
+/// Shares of the squared reconstruction error: shortly after a rupture, true or declared; otherwise before the last true
+/// one; otherwise after it.
 fn error_shares(insertion: &Insertion, run: &Run) -> [f64; 3] {
     let ruptures = &insertion.simulation.truth.ruptures;
     let mut from: Vec<f64> = ruptures.iter().map(|r| r.time_s).collect();

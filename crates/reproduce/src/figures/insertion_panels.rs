@@ -109,7 +109,7 @@ fn spans(insertion: &Insertion) -> Vec<(f64, f64, usize)> {
     spans
 }
 
-/// A value per span, held over it, with a gap behind.
+/// A value per span, constant over it and followed by a gap.
 fn held(spans: impl Iterator<Item = (f64, f64, f64)>) -> (Vec<f64>, Vec<f64>) {
     let (mut x, mut y) = (Vec::new(), Vec::new());
     for (from, to, value) in spans {
