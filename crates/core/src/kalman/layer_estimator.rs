@@ -347,8 +347,7 @@ impl LayerEstimator {
             [self.log_density_of_free(true, noise), self.log_density_of_free(false, noise)];
     }
 
-    /// Reverts the free-tip assumption when a force drop shows a layer: moves half of the slope, with that sd, from friction to
-    /// stiffness.
+    /// Reverts the free-tip assumption after a drop: moves half of the slope, with that sd, from friction to stiffness.
     pub(super) fn reopen_split(&mut self, drive: f64, unit: f64) {
         let widest = max_slope(unit);
         let half = (0.5 * self.slope(drive)).clamp(-widest, widest);
@@ -498,7 +497,7 @@ impl LayerEstimator {
         total * share
     }
 
-    /// Log density of the state at `K = 0` and `b = b'` (`follows`) or `b = 0`.
+    /// Log density of the state, up to a constant, at `K = 0` and `b = b'` (`follows`) or `b = 0`.
     pub(super) fn log_density_of_free(&self, follows: bool, noise: &NoiseEstimator) -> f64 {
         let g = &self.belief;
         let (mut b, mut vb, mut cov) = (g.x[B], g.p[B][B], g.cov(B, K));
