@@ -1,4 +1,4 @@
-//! `stylet check`: what recordings can show, before a diagnosis.
+//! `stylet check`: what recordings can identify, before a diagnosis.
 
 use crate::cli::args::CheckArgs;
 use crate::cli::exit_codes::Failure;
@@ -11,8 +11,7 @@ use stylet_report::pages::experiment_check::summary_sentence;
 
 /// `stylet check`.
 ///
-/// # Errors
-/// [`Failure`] with the exit code that fits; [`Failure::Unusable`] where a diagnosis would mean nothing.
+/// # Errors [`Failure`] with its exit code; [`Failure::Unusable`] if the recordings are unusable for a diagnosis.
 pub fn check(args: &CheckArgs) -> Result<(), Failure> {
     args.limits.check(
         &args.assumed,

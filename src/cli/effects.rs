@@ -42,7 +42,7 @@ pub fn effects(args: &EffectsArgs) -> Result<(), Failure> {
     }
 }
 
-/// `CoulombFriction`, as scenarios write it, as an id.
+/// Converts a name such as `CoulombFriction` to an id.
 fn snake_case(name: &str) -> String {
     let mut id = String::new();
     for c in name.chars() {
@@ -54,7 +54,7 @@ fn snake_case(name: &str) -> String {
     id
 }
 
-/// The id that was probably meant: the closest whole id, or the one with the closest word.
+/// Suggestion for a misspelt id: the closest id, or the one with the closest word.
 fn closest_id<'a>(wrong: &str, known: &[&'a str]) -> Option<&'a str> {
     let words: Vec<&str> = known.iter().flat_map(|id| id.split('_')).collect();
     closest_name(wrong, known).or_else(|| known.iter().find(|id| id.contains(wrong)).copied()).or_else(|| {

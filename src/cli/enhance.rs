@@ -63,7 +63,7 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
     args.results.write_and_print(&folder, &result.output_files(&source)?.with_inputs(inputs), || summary)
 }
 
-/// Every number from a recording with the wrong sign or unit would be wrong.
+/// Recordings with the wrong sign or unit would give wrong results.
 fn refuse_grave(args: &EnhanceArgs, notes: &[QualityNote]) -> Result<(), Failure> {
     let grave =
         |kind| matches!(kind, QualityKind::Reversed | QualityKind::ReversedPosition | QualityKind::UnitMixUp);

@@ -27,7 +27,7 @@ pub enum Failure {
     /// The request cannot be fulfilled with these inputs; the message gives reason and remedy.
     #[error("{0}")]
     Check(String),
-    /// A diagnosis of these recordings would mean nothing.
+    /// The recordings are unusable for a diagnosis.
     #[error("a diagnosis of these recordings would mean nothing: {0}")]
     Unusable(String),
     /// Bounds of a gate do not hold.

@@ -11,7 +11,7 @@ use stylet_diagnose::Diagnosis;
 
 /// File with the layers that the diagnosis started from.
 const FOUND_FILE: &str = "assumed.ron";
-/// First words of a phantom, by which an earlier one is recognised.
+/// First line of a written phantom, by which an earlier one is recognised.
 const PHANTOM_COMMENT: &str = "// Phantom identified by stylet";
 
 /// `stylet identify`.
@@ -95,7 +95,7 @@ fn run(
     Ok(())
 }
 
-/// The phantom with a comment that says where it comes from.
+/// The phantom with a comment on its origin.
 fn phantom_ron(found: &stylet_api::DiagnosisReport, data: &[PathBuf]) -> Result<String, Failure> {
     let names: Vec<String> =
         data.iter().map(|p| p.display().to_string().replace(['\n', '\r'], " ")).collect();
@@ -103,7 +103,7 @@ fn phantom_ron(found: &stylet_api::DiagnosisReport, data: &[PathBuf]) -> Result<
     Ok(format!("{PHANTOM_COMMENT} {} in {}.\n{ron}", env!("CARGO_PKG_VERSION"), names.join(", ")))
 }
 
-/// Refuses to replace a file that is no earlier phantom.
+/// Rejects replacing a file that is not an earlier phantom.
 fn check_phantom(path: &Path) -> Result<(), Failure> {
     let earlier = match std::fs::read(path) {
         Ok(bytes) => bytes.starts_with(PHANTOM_COMMENT.as_bytes()),

@@ -1,4 +1,4 @@
-//! `stylet inspect`: what a file holds.
+//! `stylet inspect`: contents of a file.
 
 use crate::cli::args::InspectArgs;
 use crate::cli::exit_codes::Failure;

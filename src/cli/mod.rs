@@ -41,7 +41,7 @@ use std::process::ExitCode;
 const RECORDING_EXTENSIONS: [&str; 11] =
     ["csv", "txt", "tsv", "xlsx", "ods", "mat", "h5", "hdf5", "parquet", "mcap", "db3"];
 
-/// The parsed arguments. Ends the process on wrong ones; a name of an earlier version is refused with the new one.
+/// Parses the arguments and ends the process on wrong ones. Names of earlier versions are rejected with the new name.
 fn arguments() -> Cli {
     Cli::try_parse().unwrap_or_else(|mut error| {
         let renamed = [ContextKind::InvalidArg, ContextKind::InvalidSubcommand].into_iter().find_map(
@@ -95,7 +95,7 @@ fn memory_limit(command: &Command) -> f64 {
 pub fn main() -> ExitCode {
     let cli = arguments();
     stylet_record::memory_limit::set_memory_limit(memory_limit(&cli.command) as u64);
-    // A panic is a bug: it ends with the exit code of internal errors.
+    // A panic is a bug and ends with the exit code of internal errors.
     let outcome = std::panic::catch_unwind(|| match &cli.command {
         Command::Run(args) => run::run(args),
         Command::Enhance(args) => enhance::enhance(args),

@@ -70,7 +70,7 @@ impl OutputArgs {
     }
 }
 
-/// File names that Stylet gives itself, so that many folders hold one.
+/// File names given by Stylet itself, which occur in many folders.
 const GENERIC_NAMES: [&str; 4] = ["extended", "recording", "scenario", "sweep"];
 
 /// The default output folder: `stylet-out/` and the input's name. For a recording (whatever is not RON) and for the names that Stylet

@@ -57,7 +57,7 @@ fn refitted_parameters(args: &PredictArgs) -> Vec<Refit> {
     args.refit.iter().map(parameter).collect()
 }
 
-/// What differs from the recordings that made the model; `None` without `--same`.
+/// Differences from the training recordings of the model; `None` without `--same`.
 fn varying_factors(args: &PredictArgs) -> Option<Vec<Factor>> {
     let is_same = |f: &Factor| {
         args.same.iter().any(|s| match s {

@@ -38,7 +38,7 @@ impl Default for ResourceLimits {
 }
 
 impl ResourceLimits {
-    /// Refuses work above a limit; prints the estimate of large work to standard error.
+    /// Rejects work above a limit; prints the estimate of large work to standard error.
     ///
     /// # Errors
     /// [`Failure::Check`] with the estimate, the limit and the remedy.

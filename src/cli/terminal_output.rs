@@ -3,7 +3,7 @@
 use crate::cli::exit_codes::Failure;
 use std::io::{IsTerminal as _, Write as _};
 
-/// Prints to standard output. A reader that has closed the pipe, as in `stylet run ... | head`, is no error.
+/// Prints to standard output. A reader that has closed the pipe, as in `stylet run ... | head`, is not an error.
 ///
 /// # Errors
 /// [`Failure::Stdout`] when standard output cannot be written, as on a full disk.

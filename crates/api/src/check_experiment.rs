@@ -1,4 +1,4 @@
-//! What recordings can show, before a diagnosis.
+//! `stylet check`: what recordings can identify, before a diagnosis.
 
 use crate::error::Error;
 use crate::output_files::OutputFiles;
@@ -15,7 +15,7 @@ pub struct CheckReport {
     pub output: OutputFiles,
 }
 
-/// Checks what recordings can show about a scenario: data, contact, motion, parameters and effects.
+/// Checks which parameters and effects of a scenario recordings can identify, and their data, contact and motion.
 ///
 /// # Errors
 /// [`Error`] when the scenario cannot be replayed along the recordings.

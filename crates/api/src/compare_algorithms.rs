@@ -1,4 +1,4 @@
-//! Several online algorithms on the same insertions: replayed scenarios, and cases of the independent simulator.
+//! Comparison of online algorithms on the same insertions: replayed scenarios, and cases of the independent simulator.
 
 use crate::benchmark::parse_word;
 use crate::error::Error;

@@ -1,4 +1,4 @@
-//! Two diagnoses compared: did they find the same model?
+//! Comparison of the models found by two diagnoses.
 
 use crate::error::Error;
 use crate::output_files::OutputFiles;
@@ -23,7 +23,7 @@ fn load(path: &Path) -> Result<Diagnosis, Error> {
     })
 }
 
-/// The file of a diagnosis, given itself or its folder.
+/// The file of a diagnosis, from the path of the file or of its folder.
 #[must_use]
 pub fn diagnosis_file(path: &Path) -> PathBuf {
     if path.is_dir() { path.join("diagnosis.json") } else { path.to_owned() }
@@ -31,8 +31,7 @@ pub fn diagnosis_file(path: &Path) -> PathBuf {
 
 /// Compares two diagnoses, given by their folders or files: the result, and the files that `stylet compare-models` writes.
 ///
-/// # Errors
-/// [`Error::Request`] when one of them is no diagnosis of single recordings by this version.
+/// # Errors [`Error::Request`] when one of them is not a diagnosis of single recordings by this version.
 pub fn compare_models(a: &Path, b: &Path) -> Result<(Consistency, OutputFiles), Error> {
     let found = compare(&load(a)?, &load(b)?);
     let mut output = OutputFiles::default();

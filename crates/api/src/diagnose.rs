@@ -12,7 +12,7 @@ use stylet_scenario::Scenario;
 pub struct DiagnosisReport {
     /// Verdict, causes, intervals, gain.
     pub diagnosis: Diagnosis,
-    /// The scenario with re-fitted parameters and the effects found.
+    /// The scenario with re-fitted parameters and identified effects.
     pub extended: Scenario,
     /// Intermediate results, for the report.
     pub details: DiagnosisResult,
@@ -97,8 +97,8 @@ pub fn diagnose(
     Ok(DiagnosisReport::new(details, &recordings))
 }
 
-/// Finds the layers that recordings show, `layers` of them or as many as there are, and diagnoses what is left: the scenario that it
-/// started from, and the diagnosis.
+/// Finds the layers in recordings (`layers` of them, if given) and diagnoses the residual. Returns the scenario that it started from, and
+/// the diagnosis.
 ///
 /// # Errors
 /// As [`diagnose`].
@@ -112,7 +112,7 @@ pub fn identify(
     let (scenario, details) =
         stylet_diagnose::identify(name, &recordings, layers, &Options::default(), progress)?;
     let mut report = DiagnosisReport::new(details, &recordings);
-    // The numbers are known now.
+    // The number of samples is known now.
     let usual = Scenario::new(String::new(), scenario.tissue.clone(), scenario.motion.clone());
     report.extended.tolerance = usual.tolerance;
     report.extended.thickness_tolerance = usual.thickness_tolerance;

@@ -81,7 +81,7 @@ pub fn load_data_set(inputs: &DiagnosisInputs) -> Result<Dataset, Error> {
     Ok(set)
 }
 
-/// The given recordings, or else those that the data set names.
+/// The given recordings, or, if there are none, those of the data set.
 ///
 /// # Errors
 /// [`Error::Request`] when there are none, [`Error::Dataset`] when a file is missing.
@@ -101,8 +101,8 @@ pub fn recording_files(set: &Dataset, given: &[PathBuf]) -> Result<Vec<PathBuf>,
     Ok(out)
 }
 
-/// Diagnoses the recordings of a data set; `progress` is called with the name of each stage. With recordings `given` by hand the others that
-/// the set names (in air, under a known load, single layers) may be missing.
+/// Diagnoses the recordings of a data set; `progress` is called with the name of each stage. If recordings are `given` explicitly, the other
+/// files of the set (in air, under a known load, single layers) may be missing.
 ///
 /// # Errors
 /// [`Error::Dataset`] when there are too few recordings, [`Error::Recording`] when a recording is wrong.
@@ -195,7 +195,7 @@ fn run_online(run: &SegmentedRecording, study: &SetDiagnosis, i: usize) -> Measu
     })
 }
 
-/// Reads a recording that the data set names; with recordings given by hand it may be missing.
+/// Reads a recording of the data set; it may be missing if recordings were given explicitly.
 fn optional(set: &Dataset, file: Option<&str>, given: bool) -> Result<Option<Recording>, Error> {
     let Some(file) = file else { return Ok(None) };
     let found = match find_files(file) {

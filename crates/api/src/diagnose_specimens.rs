@@ -14,7 +14,7 @@ use stylet_report::pages::indented_specimens::page;
 pub struct SpecimensReport {
     /// Causes, parameters over the specimens, unused specimens.
     pub specimens: SpecimenReport,
-    /// The same as a diagnosis.
+    /// The same result in the form of a diagnosis.
     pub diagnosis: Diagnosis,
 }
 

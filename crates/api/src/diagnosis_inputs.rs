@@ -10,7 +10,7 @@ use stylet_record::{ReadOptions, read_csv};
 use stylet_scenario::Scenario;
 use stylet_stats::parallel::*;
 
-/// Inputs of a diagnosis, as `inputs.json` holds them.
+/// Inputs of a diagnosis; the content of `inputs.json`.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct DiagnosisInputs {
     /// Scenario file.

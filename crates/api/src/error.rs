@@ -1,4 +1,4 @@
-//! Errors: what is wrong, where, and the remedy.
+//! Errors of the commands: what is wrong, where, and the remedy.
 
 use miette::Diagnostic;
 use std::path::Path;
@@ -142,13 +142,13 @@ impl From<ShardError> for Error {
 }
 
 impl Error {
-    /// Whether the inputs are right, but a diagnosis of the recordings would mean nothing.
+    /// Whether the inputs are valid, but the recordings are unusable for a diagnosis.
     #[must_use]
     pub fn is_unusable(&self) -> bool {
         matches!(self, Self::Diagnose(stylet_diagnose::DiagnoseError::Unusable { .. }))
     }
 
-    /// Why planning failed, with the file concerned.
+    /// Error of planning, with the file concerned.
     pub(crate) fn of_plan(file: &Path, why: PlanError) -> Self {
         match why {
             PlanError::Diagnose(why) => Self::Diagnose(why),

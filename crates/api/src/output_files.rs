@@ -15,7 +15,7 @@ pub fn to_json_bytes(value: &impl Serialize) -> Result<Vec<u8>, Error> {
     Ok(json)
 }
 
-/// A text for a comment of one line: a line break in a path would end the comment.
+/// Removes line breaks, so that a path fits in a one-line comment.
 pub(crate) fn one_line(text: &str) -> String {
     text.chars()
         .map(|c| if c.is_control() { c.escape_default().to_string() } else { c.to_string() })

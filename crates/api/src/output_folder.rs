@@ -40,7 +40,7 @@ const RESULT_FILES: [(&str, &str); 11] = [
     ("cases.json", "benchmark plan"),
 ];
 
-/// Exclusive use of an output folder, until it is dropped.
+/// Exclusive lock of an output folder, released on drop.
 #[derive(Debug)]
 pub struct OutputLock {
     folder: PathBuf,
@@ -91,7 +91,7 @@ pub struct StagedFile {
 }
 
 impl OutputLock {
-    /// Creates the folder if missing, locks it, and completes what an interrupted command left.
+    /// Creates the folder if missing, locks it, and completes an interrupted write.
     ///
     /// # Errors
     /// [`Error::Output`] when it cannot be created, [`Error::Busy`] when another process holds it.
@@ -143,7 +143,7 @@ impl OutputLock {
         &self.folder
     }
 
-    /// Opens a file of a set for writing in pieces; [`OutputLock::write_set`] commits it. Without that it is removed with the lock.
+    /// Opens a file of a set for writing in pieces; [`OutputLock::write_set`] commits it. Otherwise it is removed when the lock is dropped.
     ///
     /// # Errors
     /// [`Error::Output`]; the folder is then unchanged.
@@ -160,8 +160,8 @@ impl OutputLock {
         Ok(StagedFileWriter { name, place, file, hash: Sha256::new() })
     }
 
-    /// Writes a set: files in memory and staged files. Files of the same names are replaced when the folder's manifest lists them and they are
-    /// no inputs; others are left alone.
+    /// Writes a set: files in memory and staged files. Files of the same names are replaced if the folder's manifest lists them and they are
+    /// not inputs; other files are kept.
     ///
     /// # Errors
     /// [`Error::OtherCommand`], [`Error::NotReplaced`], [`Error::OtherInput`], [`Error::Output`]; the folder is then unchanged.
@@ -248,7 +248,7 @@ impl Drop for OutputLock {
     }
 }
 
-/// Completes a set that a killed command had committed but not moved; does nothing otherwise.
+/// Completes the set of a killed command that was committed but not moved; otherwise does nothing.
 ///
 /// # Errors
 /// [`Error::Output`], [`Error::Busy`] when the other command still runs.
@@ -259,7 +259,7 @@ pub fn recover(folder: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// Refuses to write a set into a folder that holds the results of another command: files of both would remain there.
+/// Rejects a folder with the results of another command, because files of both would remain there.
 ///
 /// # Errors
 /// [`Error::OtherCommand`].
@@ -306,7 +306,8 @@ pub fn verify_manifest(folder: &Path, names: &[&str]) -> Result<(), Error> {
     Ok(())
 }
 
-/// Writes one file atomically: to a temporary name, synced, then renamed. What is no regular file, such as `/dev/stdout`, is written to.
+/// Writes one file atomically: to a temporary name, synced, then renamed. A path that is not a regular file, such as `/dev/stdout`, is
+/// written to directly.
 ///
 /// # Errors
 /// [`Error::Output`]; the former file is then unchanged.

@@ -80,10 +80,10 @@ pub fn plan_after_recordings(
     Ok(PlanReport { plan, scenario, verdict, ground })
 }
 
-/// First words of a planned motion.
+/// First line of the file of a planned motion.
 const MOTION_COMMENT: &str = "// The next insertion, planned by stylet";
 
-/// Refuses to replace an input, or a file that is not of an earlier plan, by a plan written to `out`.
+/// Checks that a plan written to `out` replaces neither an input nor a file that is not from an earlier plan.
 ///
 /// # Errors
 /// [`Error::NotReplaced`].

@@ -1,4 +1,4 @@
-//! A model against recordings that took no part in making it.
+//! Files of `stylet predict`: a model against held-out recordings.
 
 use crate::diagnosis_inputs::DiagnosisInputs;
 use crate::error::Error;
@@ -8,18 +8,18 @@ use stylet_diagnose::Diagnosis;
 use stylet_diagnose::prediction::PredictionResult;
 use stylet_scenario::Scenario;
 
-/// Where a model came from, as the folder in which it lies tells.
+/// Origin of a model, from the other files in its folder.
 #[derive(Clone, Debug, Default)]
 pub struct ModelOrigin {
-    /// The diagnosis that made it.
+    /// The diagnosis that produced it.
     pub diagnosis: Option<Diagnosis>,
     /// The scenario before the diagnosis.
     pub assumed: Option<Scenario>,
 }
 
 impl ModelOrigin {
-    /// The files next to a model; `assumed` is the scenario before the diagnosis when the folder does not name it. A scenario that is gone since
-    /// the diagnosis is nobody's error.
+    /// Reads the files next to a model; `assumed` is the scenario before the diagnosis, if the folder does not name it. If that scenario has
+    /// been deleted since, it is left out without an error.
     ///
     /// # Errors
     /// [`Error::Request`] when `diagnosis.json` is of another version, [`Error::Input`] when `assumed` is wrong.
@@ -34,7 +34,7 @@ impl ModelOrigin {
     }
 }
 
-/// The diagnosis that a model came from, if it lies next to it.
+/// The diagnosis in the folder of a model, if there is one.
 pub(crate) fn diagnosis(path: &Path) -> Result<Option<Diagnosis>, Error> {
     let Ok(text) = std::fs::read_to_string(path) else { return Ok(None) };
     serde_json::from_str(&text).map(Some).map_err(|e| {

@@ -96,7 +96,7 @@ pub fn estimate_enhance(data: &Path, models: usize) -> Option<ResourceEstimate> 
     Some(ResourceEstimate { description, ..estimate_enhance_samples(samples, models) })
 }
 
-/// As [`estimate_enhance`] for a number of samples, which for files of other programs and pipes is known once they are read.
+/// As [`estimate_enhance`] for a known number of samples; for pipes and foreign formats it is known only after reading.
 #[must_use]
 pub fn estimate_enhance_samples(samples: f64, models: usize) -> ResourceEstimate {
     ResourceEstimate {
@@ -123,7 +123,7 @@ pub fn estimate_diagnose(data: &[PathBuf]) -> ResourceEstimate {
     ResourceEstimate { description, ..estimate_diagnose_samples(&each) }
 }
 
-/// As [`estimate_diagnose`] for the numbers of samples, which for files of other programs and pipes are known once they are read.
+/// As [`estimate_diagnose`] for known numbers of samples; for pipes and foreign formats they are known only after reading.
 #[must_use]
 pub fn estimate_diagnose_samples(each: &[f64]) -> ResourceEstimate {
     let all: f64 = each.iter().sum();

@@ -11,13 +11,13 @@ use stylet_sweep::{
     Columns, DiskTrialTable, Overrides, Summary, Sweep, TrialRow, TrialSampler, TrialTableWriter, run_trials,
 };
 
-/// Trials per shard of a whole sweep: the most that an interruption can lose.
+/// Trials per shard of a whole sweep; an interruption loses at most one shard.
 pub const SHARD_TRIALS: u64 = 1024;
 
 /// Trials run to measure the time of one.
 const PROBE_TRIALS: u64 = 32;
 
-/// Refuses to mix a sweep of `of` shards with an unfinished one, or with the results of another command, in the folder.
+/// Rejects a folder with an unfinished sweep that was not split into `of` shards, or with the results of another command.
 ///
 /// # Errors
 /// [`Error::Request`] with the remedy, [`Error::OtherCommand`].
@@ -139,7 +139,7 @@ pub fn read_all_shards(sweep: &Sweep, columns: &Columns, out: &Path) -> Result<D
     all.finish()
 }
 
-/// Writes the results into the locked folder `out` and removes the shards, but no other files beside them.
+/// Writes the results into the locked folder `out` and removes the shards, but no other files.
 ///
 /// # Errors
 /// [`Error::Output`].

@@ -5,7 +5,7 @@
 
 use alloc::vec::Vec;
 
-/// Regressor of the friction.
+/// Regressor of a layer's force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Model {
@@ -50,7 +50,7 @@ pub enum Contact {
     Detected,
     /// At the surface position that the caller passes to the core.
     Known,
-    /// None is searched: the recording begins with the tip in the tissue, and forces are absolute.
+    /// No contact detection: the recording begins with the tip in the tissue, and forces are absolute.
     None,
 }
 
@@ -70,7 +70,7 @@ impl Contact {
 #[derive(Clone, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Depths {
-    /// None: a layer ends where a rupture is detected.
+    /// Not known: a layer ends where a rupture is detected.
     #[default]
     Unknown,
     /// Thicknesses in m from a model of the anatomy; a layer ends at the latest when the tip passes its far face.
@@ -286,11 +286,11 @@ impl Default for GuardConfig {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Algorithm {
-    /// The paper's, with the completions \[D\].
+    /// The paper's algorithm with the completions \[D\].
     Paper,
-    /// The paper's to the letter: no blind travel after contact, no motion guards, drop by extremes. At 20 mN of noise and
-    /// with contact detected in the data nearly every insertion has a false rupture right after contact, and with the sinusoid
-    /// from rest the first layer's `K` is off by half (`tests/detection_over_noise_seeds.rs`).
+    /// The paper's algorithm as printed: no blind travel after contact, no motion guards, drop by extremes. At 20 mN of noise and with
+    /// contact detected in the data nearly every insertion has a false rupture right after contact, and with the sinusoid from rest the
+    /// first layer's `K` is off by half (`tests/detection_over_noise_seeds.rs`).
     Literal,
     /// Kalman filters with calibrated intervals, see [`StyletConfig`]. It has the multi-layer model only and detects layers
     /// itself: with [`Model::KelvinVoigt`] or [`Depths::Known`] the paper's algorithm runs instead.
@@ -298,13 +298,13 @@ pub enum Algorithm {
     Stylet,
 }
 
-/// Law of the shaft friction `D u` that [`Algorithm::Stylet`] subtracts: the drive `u`; the cumulative friction `D` (N s/m) is
-/// estimated.
+/// Law of the shaft friction `D u` that [`Algorithm::Stylet`] subtracts. The law defines the drive `u` (m/s); the cumulative friction
+/// `D` (N s/m) is estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub enum FrictionLaw {
-    /// Selected during insertion: viscous as long as that predicts the force, then dry.
+    /// Selected during insertion: viscous while that predicts the force, dry afterwards.
     #[default]
     Auto,
     /// The paper's: `u = v`.
@@ -336,10 +336,11 @@ pub struct StyletConfig {
     pub min_drop_share: f64,
     /// Law of the shaft friction.
     pub friction_law: FrictionLaw,
-    /// Slow changes of the force during retraction count as friction; off: only what was estimated during insertion.
+    /// If true, slow changes of the force during retraction are attributed to friction; if false, friction keeps the value estimated
+    /// during insertion.
     pub track_retraction: bool,
-    /// Velocities are derived from the positions by a causal filter, not measured. Where the needle stops within a step they say so one
-    /// sample later, so that a fall of the force that may be the friction's waits for the next position.
+    /// True if velocities are derived from positions by a causal filter instead of measured. They show a stop one sample late, so a
+    /// force drop that may be lost friction is declared a rupture only after the next position.
     pub derived_velocity: bool,
 }
 

@@ -1,4 +1,4 @@
-//! The online core: one of the algorithms behind one interface.
+//! [`Enhancer`], the common interface of the online algorithms: one [`Sample`] in, one [`Output`] out.
 
 use crate::config::{Algorithm, EnhanceConfig, Model};
 use crate::kalman::KalmanEnhancer;
@@ -7,17 +7,16 @@ use crate::sample::{Output, Sample, UnusedReason};
 use crate::sample_clock::{SampleClock, Verdict};
 use crate::units::Units;
 
-/// Samples that are checked ahead of the algorithm in [`Enhancer::run`].
+/// Samples per block in [`Enhancer::run`] whose values and time stamps are checked before the algorithm runs.
 const BLOCK_SAMPLES: usize = 64;
 
 /// The online core: [`Enhancer::step`] is called once per sample.
 ///
 /// It does not allocate, and the work per sample is bounded for every [`Algorithm`]:
 ///
-/// - `Paper`, `Literal`: one RLS update, at most
-///   [`DropConfig::replay_per_tick`](crate::config::DropConfig::replay_per_tick) replayed samples, and at a declared rupture
-///   one look back over at most 256 samples. The storage `B` (a `Vec<Sample>` or an array) keeps the raw samples of the
-///   active layer for its replay; of a layer with more samples the oldest are lost.
+/// - `Paper`, `Literal`: one RLS update, at most [`DropConfig::replay_per_tick`](crate::config::DropConfig::replay_per_tick)
+///   replayed samples, and at each rupture a search over at most 256 earlier samples. The storage `B` (a `Vec<Sample>` or an
+///   array) is a ring buffer of the active layer's raw samples for its replay; the oldest are overwritten.
 /// - `Stylet`: two small Kalman updates, no replay. The storage is not used and may be an empty array.
 #[derive(Clone, Debug)]
 pub struct Enhancer<B> {
@@ -26,19 +25,19 @@ pub struct Enhancer<B> {
     clock: SampleClock,
     surface_m: f64,
     units: Units,
-    /// The last output in m and N, where the units are others.
+    /// Last output converted to m and N; used only if `units` are not SI.
     converted: Output,
 }
 
 impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
-    /// A core with `storage` for the raw samples of a layer. `surface_m` is the position of the tissue surface, used with
-    /// [`Contact::Known`](crate::config::Contact::Known).
+    /// Creates an enhancer with `storage` for the raw samples of a layer. `surface_m` is the position of the tissue surface, used
+    /// with [`Contact::Known`](crate::config::Contact::Known).
     pub fn new(config: EnhanceConfig, surface_m: f64, storage: B) -> Self {
         Self::with_units(config, surface_m, Units::default(), storage)
     }
 
-    /// As [`Enhancer::new`] for a needle or forces of another size: the lengths and forces of configuration and constants are in
-    /// these units, samples, surface and outputs in m and N.
+    /// As [`Enhancer::new`] for needles or forces of another scale: lengths and forces in `config` and in the internal constants
+    /// are in `units`; samples, surface and outputs are in m and N.
     pub fn with_units(config: EnhanceConfig, surface_m: f64, units: Units, storage: B) -> Self {
         let surface_m = surface_m / units.length_m;
         let kalman =
@@ -60,11 +59,11 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// Processes one sample. A sample that is not finite, out of range, or not later than the previous one is ignored
-    /// ([`Output::used`] is false, [`Output::unused_reason`] says why).
+    /// ([`Output::used`] is false; see [`Output::unused_reason`]).
     ///
-    /// So is a sample whose time jumps: by a second back or more, or by more than a second ahead. When five samples in a row
-    /// continue such a jump, it is a pause (of up to ten minutes ahead), which the algorithm takes like a long interval, or a new
-    /// clock, at which it is re-initialised ([`Output::restarted`]). A single wrong time stamp has no effect.
+    /// A time stamp that jumps back by 1 s or more, or ahead by more than 1 s, is ignored until five consecutive samples confirm
+    /// it. A confirmed jump ahead of up to ten minutes is a pause and is processed as a long interval; any other is a new clock
+    /// and re-initialises the algorithm ([`Output::restarted`]).
     #[inline]
     pub fn step(&mut self, sample: Sample) -> Output {
         if !self.units.are_si() {
@@ -197,10 +196,10 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     }
 
     /// Enhanced force of the last sample in N and its 95 % band, with the shaft friction `friction_n` of an identified model in
-    /// place of the core's own estimate. To be called once after every [`Enhancer::step`]; the model should count a layer as
-    /// punctured from the sample at which the core has declared its rupture. During retraction `Stylet` corrects the model by
-    /// the measured force ([`StyletConfig::track_retraction`](crate::config::StyletConfig::track_retraction)). `None` with the
-    /// other algorithms.
+    /// place of the core's own estimate. Call it once after every [`Enhancer::step`]; the model should count a layer as punctured
+    /// from the sample at which the core declared its rupture. During retraction `Stylet` corrects the model by the measured
+    /// force ([`StyletConfig::track_retraction`](crate::config::StyletConfig::track_retraction)). `None` with the other
+    /// algorithms.
     pub fn apply_model_friction(&mut self, friction_n: f64) -> Option<(f64, [f64; 2])> {
         let config = self.paper.config();
         let unit_n = self.units.force_n;
@@ -209,8 +208,8 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
         Some((unit_n * enhanced_n, band.map(|n| unit_n * n)))
     }
 
-    /// The state is finite and every covariance positive definite; for tests and monitors. `Stylet` restarts filters that
-    /// rounding or invalid data have spoilt.
+    /// True if the state is finite and every covariance positive definite; for tests and monitoring. `Stylet` re-initialises
+    /// filters that become invalid.
     #[must_use]
     pub fn is_numerically_valid(&self) -> bool {
         self.kalman.as_ref().is_none_or(KalmanEnhancer::is_numerically_valid)

@@ -1,9 +1,10 @@
-//! The online core: identification of the needle-tissue interaction and force enhancement during insertion.
+//! The online core: identifies the needle-tissue interaction and computes the enhanced force during insertion, sample by
+//! sample.
 //!
 //! Ferro, Gaz, Anzidei, Vendittelli, "Online needle-tissue interaction model identification for force feedback enhancement in
 //! robot-assisted interventional procedures" (2021): recursive least squares on a Kelvin-Voigt or multi-layer model, rupture
 //! detection by CUSUM and force derivative, a posteriori re-weighting of the covariance by the force drop, friction
-//! compensation. The default algorithm, `Stylet`, replaces these by Kalman filters, see `docs/explanation/enhancer.md`.
+//! compensation. The default algorithm, `Stylet`, uses Kalman filters instead, see `docs/explanation/enhancer.md`.
 //!
 //! `no_std`; no allocation after construction; bounded work per sample.
 //!

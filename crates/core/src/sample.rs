@@ -1,7 +1,7 @@
 //! Input and output of the core, one value per sample.
 
-/// Number of traversed layers kept apart for retraction. Friction of further layers is still compensated during insertion,
-/// but merged into the last one.
+/// Largest number of traversed layers stored separately for retraction. The friction of further layers is still compensated
+/// during insertion, but merged into the last one.
 pub const MAX_LAYERS: usize = 16;
 
 /// One measurement.
@@ -18,15 +18,15 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// Every field is finite and physically possible: positions within a kilometre, speeds below 1 km/s, forces below 1 MN.
-    /// Anything else is a logging error and would spoil the estimates for good.
+    /// True if every field is finite and physically possible: positions within 1 km, speeds below 1 km/s, forces below 1 MN.
+    /// Other values are logging errors, which would corrupt the estimates permanently.
     #[must_use]
     #[inline]
     pub fn is_usable(&self) -> bool {
         self.time_s.is_finite() && self.is_in_range()
     }
 
-    /// Position, velocity and force alone.
+    /// As [`Sample::is_usable`], without the time.
     #[inline]
     pub(crate) fn is_in_range(&self) -> bool {
         self.position_m.abs() < 1e3 && self.velocity_mps.abs() < 1e3 && self.force_n.abs() < 1e6
@@ -60,7 +60,7 @@ impl UnusedReason {
         }
     }
 
-    /// Why a sample that is not usable is not.
+    /// Reason why a sample fails [`Sample::is_usable`].
     #[cold]
     pub(crate) fn of_values(sample: &Sample) -> Self {
         let finite = [sample.time_s, sample.position_m, sample.velocity_mps, sample.force_n];
@@ -155,7 +155,7 @@ pub struct Detection {
     pub drop_n: f64,
     /// Standard deviation of `drop_n` in N (`Stylet`).
     pub drop_sd_n: f64,
-    /// Probability that it is no false alarm, 0 to 1 (`Stylet`).
+    /// Probability that the rupture is not a false alarm, 0 to 1 (`Stylet`).
     pub confidence: f64,
 }
 
@@ -192,7 +192,7 @@ pub struct LayerEstimate {
     pub cumulative_sd: f64,
 }
 
-/// What the force did in air, apart from noise.
+/// Form of the sensor baseline in air, apart from noise.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -221,12 +221,12 @@ impl BaselineKind {
     }
 }
 
-/// The baseline of the force that `Stylet` follows: `f = offset + drift (t - t_now) + line (z - z_now)`. Standard deviations are
-/// zero where nothing has been estimated.
+/// Baseline of the force as estimated by `Stylet`: `f = offset + drift (t - t_now) + line (z - z_now)`. Standard deviations are
+/// zero where no estimate exists.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Baseline {
-    /// Its form.
+    /// Form of the baseline.
     pub kind: BaselineKind,
     /// Force without contact at this sample in N.
     pub offset_n: f64,
@@ -240,7 +240,7 @@ pub struct Baseline {
     pub zero_steps: usize,
 }
 
-/// A step of the sensor's zero (a tare, a slipping amplifier): a jump between two samples that is no rupture.
+/// A step of the sensor's zero (a tare, a slipping amplifier): a jump between two samples that is not a rupture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ZeroStep {
@@ -252,9 +252,9 @@ pub struct ZeroStep {
     pub size_n: f64,
     /// Standard deviation of the size in N.
     pub sd_n: f64,
-    /// The needle was in tissue.
+    /// Whether the needle was in tissue.
     pub in_tissue: bool,
-    /// The rupture of this number was this step: it and its layer are withdrawn.
+    /// Number of an earlier declared rupture that was this step; the rupture and its layer are withdrawn.
     pub withdrawn: Option<usize>,
 }
 
@@ -288,7 +288,7 @@ pub struct Output {
     pub contact_m: Option<f64>,
     /// Standard deviation of `contact_m` in m; zero where the algorithm does not provide it (`Stylet`).
     pub contact_sd_m: f64,
-    /// Probability of the contact against a moving baseline or a step of the zero without one, 0 to 1 (`Stylet`).
+    /// Probability that the load is a contact, not a moving baseline or a step of the zero, 0 to 1 (`Stylet`).
     pub contact_probability: f64,
     /// Baseline of the force (`Stylet`).
     pub baseline: Baseline,

@@ -1,14 +1,14 @@
-//! Check of time stamps before the algorithm: outliers are ignored, a new clock is recognised.
+//! Check of time stamps before the algorithm runs: ignores outliers and detects a new clock.
 
 use crate::sample::UnusedReason;
 
 /// Longest interval in s between consecutive samples that needs no confirmation by later ones.
 const MAX_INTERVAL_S: f64 = 1.0;
-/// The same in units of the interval of a slow stream, once that is confirmed.
+/// The same limit for slow streams, as a multiple of their confirmed sampling interval.
 const MAX_INTERVAL_FACTOR: f64 = 20.0;
 /// Samples in a row with consistent time stamps that confirm a jump of the clock.
 const CONFIRMING_SAMPLES: u32 = 5;
-/// Longest pause in s within one insertion; a clock that is further ahead is a new one.
+/// Longest pause in s within one insertion; a longer jump ahead is a new clock.
 const MAX_PAUSE_S: f64 = 600.0;
 
 /// What to do with a sample.
@@ -35,10 +35,10 @@ struct Candidate {
 
 /// Time stamps of the used samples.
 ///
-/// A stamp up to [`MAX_INTERVAL_S`] after the previous one is used. Any other one waits until [`CONFIRMING_SAMPLES`] samples in
-/// a row continue it: so a single outlier is ignored, a pause of up to [`MAX_PAUSE_S`] continues the insertion, and a clock that
-/// has been set back or far ahead restarts the algorithm. Stamps set back by less than [`MAX_INTERVAL_S`] are ignored until they
-/// have caught up.
+/// A stamp up to [`MAX_INTERVAL_S`] after the previous one is used. Any other is ignored until [`CONFIRMING_SAMPLES`]
+/// consecutive samples confirm it. A single outlier is therefore ignored, a pause of up to [`MAX_PAUSE_S`] continues the
+/// insertion, and a clock set back or far ahead restarts the algorithm. Stamps set back by less than [`MAX_INTERVAL_S`] are
+/// ignored until they catch up.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SampleClock {
     /// Minus infinity before the first sample.
@@ -55,7 +55,7 @@ impl Default for SampleClock {
 }
 
 impl SampleClock {
-    /// Takes the finite time stamp of a sample that is usable otherwise.
+    /// Decides on a sample from its time stamp, which must be finite.
     #[inline(always)]
     pub(crate) fn check(&mut self, time_s: f64) -> Verdict {
         if self.continues(time_s) {
@@ -79,7 +79,7 @@ impl SampleClock {
         self.last_s
     }
 
-    /// Undoes the acceptance of a sample that the algorithm has refused: `last_s` is the time of the last used sample.
+    /// Reverts an accepted time stamp when the algorithm rejects the sample; `last_s` is the time of the last used sample.
     pub(crate) fn revert_to(&mut self, last_s: f64) {
         self.last_s = last_s;
     }

@@ -1,18 +1,18 @@
-//! Units of length and force: the core's constants are made for needles of centimetres and forces of newtons; a phantom of
-//! another size is the same phantom in other units.
+//! Internal units of length and force. The core's constants are made for insertions of centimetres and forces of newtons; recordings
+//! of another scale are converted to units in which they have these magnitudes.
 
 use crate::sample::{Baseline, Detection, LayerEstimate, Output, Sample, ZeroStep};
 
-/// Travel in m from which metres are the unit of length.
+/// Smallest travel in m for which metres are the unit of length.
 const MIN_TRAVEL_M: f64 = 5e-4;
-/// Mean change of the force in N for which newtons are the unit of force.
+/// Range of the mean change of the force in N for which newtons are the unit of force.
 const FORCE_RANGE_N: [f64; 2] = [0.007, 70.0];
-/// Ratio of neighbouring units.
+/// Ratio of successive units.
 const STEP: f64 = 1e3;
-/// Most steps up or down.
+/// Largest number of such steps.
 const MAX_STEPS: u32 = 3;
 
-/// Units in which a core works, in m and N: forces and lengths of its configuration and constants are in these.
+/// Internal units of an enhancer, in m and N: its configuration and constants are expressed in them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Units {
     /// Unit of length in m.
@@ -28,8 +28,7 @@ impl Default for Units {
 }
 
 impl Units {
-    /// Units in which a recording of this travel and this mean absolute change of the force is one of an ordinary needle: metres and
-    /// newtons, or by thousands more or less of them.
+    /// Units for a recording of this travel and mean absolute change of the force: m and N, or these by powers of 1000.
     #[must_use]
     pub fn for_extent(travel_m: f64, mean_change_n: f64) -> Self {
         let mut out = Self::default();
@@ -59,7 +58,7 @@ impl Units {
         }
     }
 
-    /// An output in m and N. `friction` is the unit of `b` of the regressor.
+    /// Converts an output to m and N. `friction_per_length`: whether `b` is friction per length (multi-layer model).
     pub(crate) fn output(&self, out: &Output, friction_per_length: bool) -> Output {
         let (l, f) = (self.length_m, self.force_n);
         let stiffness = f / l;

@@ -36,7 +36,7 @@ pub const NEEDLE_LENGTH_M: f64 = 0.153;
 pub const NEEDLE_COM_M: f64 = 0.09;
 /// F/T sensor with its mounts (laboratory software of the paper).
 pub const SENSOR_MASS_KG: f64 = 0.236;
-/// Height of the cylinder that stands for sensor and mounts (assumed; the needle starts on top of it).
+/// Height of the cylinder that models sensor and mounts (assumed; the needle starts on top of it).
 pub const SENSOR_HEIGHT_M: f64 = 0.03;
 /// Its radius (assumed).
 pub const SENSOR_RADIUS_M: f64 = 0.0225;

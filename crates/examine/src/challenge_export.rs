@@ -15,7 +15,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use stylet_stats::parallel::*;
 
-/// The answer key: the case behind each number.
+/// The answer key: the case of each number.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AnswerKey {
     /// Version of the case generator ([`GENERATOR_VERSION`]).
@@ -25,26 +25,26 @@ pub struct AnswerKey {
     pub cases: BTreeMap<String, CaseId>,
 }
 
-/// Why a challenge cannot be written or judged.
+/// Error of writing or scoring a challenge.
 #[derive(Debug, thiserror::Error)]
 pub enum ChallengeError {
-    /// A file or folder.
+    /// A file or folder cannot be read or written.
     #[error("{path}: {why}")]
     File {
         /// Which.
         path: String,
-        /// What the system says.
+        /// Error of the operating system.
         why: io::Error,
     },
-    /// The folder is there already.
+    /// The folder exists already.
     #[error("{0} is there already: name a folder that is not, or remove it")]
     There(String),
-    /// A file does not hold what it should.
+    /// A file has the wrong content.
     #[error("{path}: {why}")]
     Content {
         /// Which.
         path: String,
-        /// What is wrong and what would be right.
+        /// Error and expected content.
         why: String,
     },
     /// A case cannot be drawn.
@@ -62,8 +62,7 @@ pub fn key_path(folder: &Path) -> PathBuf {
 
 /// Writes a challenge into a new folder, and the answer key next to it. The order of the cases is random.
 ///
-/// # Errors
-/// [`ChallengeError`]; nothing half-written stays.
+/// # Errors [`ChallengeError`]; partial output is removed.
 pub fn export(plan: &Plan, folder: &Path) -> Result<usize, ChallengeError> {
     if folder.exists() {
         return Err(ChallengeError::There(folder.display().to_string()));
@@ -150,10 +149,9 @@ With the key, `stylet benchmark score FOLDER answers.json` scores the answers.
     )
 }
 
-/// Judges answers to a challenge, in the order of its numbers.
+/// Scores answers to a challenge, in the order of the case numbers.
 ///
-/// # Errors
-/// [`ChallengeError`]: which file, and what would be right.
+/// # Errors [`ChallengeError`] with the file and the expected content.
 pub fn score_answers(folder: &Path, answers: &Path) -> Result<Vec<CaseOutcome>, ChallengeError> {
     let key_file = key_path(folder);
     let key: AnswerKey =

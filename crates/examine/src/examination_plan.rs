@@ -1,27 +1,26 @@
-//! Which cases an examination consists of.
+//! Selection of the cases of an examination.
 
 use crate::cases::case_id::{CaseId, Hide, Severity, Size, World, Wrong};
 use crate::cases::hide_effects::intended_effect;
 
-/// An examination: rows of what is wrong, each in some severities, with a number of cases per cell.
+/// An examination: rows of misspecifications, each at some severities, with a number of cases per cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// World.
+    /// Tissue law of the simulator.
     pub world: World,
-    /// What is wrong, row by row.
+    /// Misspecifications, row by row.
     pub wrong: Vec<Wrong>,
-    /// How much of it.
+    /// Severities of the misspecification.
     pub severities: Vec<Severity>,
-    /// What is hidden; the cases of a cell go round these, so that two thirds hide something when this is
-    /// `[One, One, Clean]`.
+    /// Hidden causes; the cases of a cell cycle through these, so that with `[One, One, Clean]` two thirds hide something.
     pub hide: Vec<Hide>,
-    /// How strong it is.
+    /// Strength of the hidden causes.
     pub size: Size,
     /// Cases per cell.
     pub cases: u64,
     /// Seed.
     pub seed: u64,
-    /// Of these cases those alone whose number asks for one of these effects or shapes; empty: all.
+    /// Only cases that hide one of these effects or shapes; empty: all.
     pub only: Vec<&'static str>,
 }
 
@@ -41,7 +40,7 @@ impl Default for Plan {
 }
 
 impl Plan {
-    /// The cases, row by row. Where nothing is wrong there is one severity.
+    /// The cases, row by row. Without a misspecification there is one severity.
     #[must_use]
     pub fn cases(&self) -> Vec<CaseId> {
         let mut out = Vec::new();

@@ -1,17 +1,16 @@
-//! Independent simulator for judging the diagnosis: tissue, needle and sensor written without its code, misspecified assumed scenarios, and
-//! the scoring of answers.
+//! Independent simulator for testing the diagnosis: tissue, needle and sensor implemented without its code, misspecified assumed scenarios,
+//! and the scoring of answers.
 //!
-//! An engine is a function from a [`Question`] (the assumed scenario as RON text, the recordings) to an
-//! [`Answer`] (`diagnosis.json` as plain data). It does not see the truth, and this crate knows nothing about
-//! it: of the crates of this project it depends on those of columns and statistics alone (`record`, `stats`).
+//! An engine is a function from a [`Question`] (the assumed scenario as RON text, the recordings) to an [`Answer`] (`diagnosis.json` as
+//! plain data). It does not see the truth, and this crate does not depend on it: of this project it uses `record` and `stats` only.
 //!
-//! | module | what lives there |
+//! | module | contents |
 //! |---|---|
-//! | [`simulator`] | tissue, needle and sensor, written from the page |
-//! | [`cases`] | what is drawn: stacks, motions, effects, what is wrong and how much of it |
-//! | [`scoring`] | which answers are right, and the table |
-//! | [`challenge_export`] | cases for others, and judging their answers |
-//! | [`examination_plan`], [`mod@run_cases`] | which cases, and running an engine on them |
+//! | [`simulator`] | tissue, needle and sensor, written from docs/reference/model.md |
+//! | [`cases`] | random cases: stacks, motions, hidden effects, misspecifications |
+//! | [`scoring`] | expected answers, scores, and the results table |
+//! | [`challenge_export`] | export of cases for other programs, and scoring of their answers |
+//! | [`examination_plan`], [`mod@run_cases`] | selection of cases, and running an engine on them |
 //! | [`online`] | benchmark of online puncture detection |
 #![forbid(unsafe_code)]
 

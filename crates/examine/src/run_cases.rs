@@ -1,4 +1,4 @@
-//! Running an examination: side by side, deterministic, and resumable.
+//! Runs an examination in parallel; deterministic and resumable.
 
 use crate::cases::case_id::{CaseId, GENERATOR_VERSION};
 use crate::cases::case_recordings::{Question, make_case};
@@ -11,7 +11,7 @@ use std::sync::Mutex;
 use std::time::Instant;
 use stylet_stats::parallel::*;
 
-/// Why an examination ended early.
+/// Error of an examination.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The journal cannot be read or written.
@@ -19,10 +19,10 @@ pub enum RunError {
     Journal {
         /// File.
         path: String,
-        /// What the system says.
+        /// Error of the operating system.
         why: std::io::Error,
     },
-    /// A case could not be drawn.
+    /// A case could not be generated.
     #[error("case {name} cannot be drawn: {why}")]
     Draw {
         /// Case.
@@ -32,14 +32,13 @@ pub enum RunError {
     },
 }
 
-/// Runs an engine on cases and judges its answers, in the order of `cases` whatever the number of threads.
+/// Runs an engine on cases and scores its answers, in the order of `cases` for any number of threads.
 ///
-/// With a journal (a file of one JSON line per case) every outcome is written as soon as it is there, and cases that the journal
-/// holds are not run again; a line that was cut off when a run was stopped is. A journal belongs to one engine.
-/// `progress` receives the number of finished cases and the total.
+/// With a journal (a file of one JSON line per case) every outcome is written at once, and cases in the journal are not run
+/// again, except one whose line was cut off by an interruption. A journal belongs to one engine. `progress` receives the number
+/// of finished cases and the total.
 ///
-/// # Errors
-/// [`RunError`]. What an engine could not answer is no error of the run: it counts as wrong.
+/// # Errors [`RunError`]. A case that an engine cannot answer counts as wrong and is not an error of the run.
 pub fn run_cases(
     cases: &[CaseId],
     journal: Option<&Path>,
@@ -90,10 +89,9 @@ pub fn run_cases(
     Ok(cases.iter().filter_map(|id| done.get(id).cloned()).collect())
 }
 
-/// The outcomes that a journal holds.
+/// Reads the outcomes of a journal.
 ///
-/// # Errors
-/// What the system says, unless the file is not there; an error for outcomes of another [`GENERATOR_VERSION`].
+/// # Errors Errors of the operating system, except for a missing file; outcomes of another [`GENERATOR_VERSION`].
 pub fn read_journal(path: &Path) -> std::io::Result<BTreeMap<CaseId, CaseOutcome>> {
     let file = match std::fs::File::open(path) {
         Err(why) if why.kind() == std::io::ErrorKind::NotFound => return Ok(BTreeMap::new()),

@@ -1,18 +1,18 @@
-//! Rates as tables print them.
+//! Success rates with confidence intervals, as printed in tables.
 
 use serde::{Deserialize, Serialize};
 
 /// A rate with its 95 % interval after Wilson.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SuccessRate {
-    /// How many.
+    /// Number of successes.
     pub hits: usize,
-    /// Of how many.
+    /// Number of cases.
     pub of: usize,
 }
 
 impl SuccessRate {
-    /// How many of the items hold.
+    /// The share of the items for which `holds` is true.
     pub fn of<T>(items: impl IntoIterator<Item = T>, holds: impl Fn(&T) -> bool) -> Self {
         let mut rate = Self::default();
         for item in items {
@@ -22,7 +22,7 @@ impl SuccessRate {
         rate
     }
 
-    /// The share; not a number of nothing.
+    /// The rate; NaN without cases.
     #[must_use]
     pub fn share(&self) -> f64 {
         self.hits as f64 / self.of as f64

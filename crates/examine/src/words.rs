@@ -1,4 +1,4 @@
-//! Enumerations whose values have a word and a description.
+//! Macro for enumerations whose values have a name and a description.
 
 macro_rules! words {
     ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $word:literal : $says:literal),* $(,)? }) => {
@@ -8,19 +8,19 @@ macro_rules! words {
             $($(#[$vdoc])* #[doc = $says] #[serde(rename = $word)] $variant),*
         }
         impl $name {
-            /// All of them.
+            /// All values.
             pub const ALL: &'static [$name] = &[$($name::$variant),*];
-            /// The word for it.
+            /// Its name.
             #[must_use]
             pub fn as_str(self) -> &'static str {
                 match self { $($name::$variant => $word),* }
             }
-            /// What it means.
+            /// Its description.
             #[must_use]
             pub fn description(self) -> &'static str {
                 match self { $($name::$variant => $says),* }
             }
-            /// By its word.
+            /// The value of this name.
             #[must_use]
             pub fn parse(word: &str) -> Option<Self> {
                 Self::ALL.iter().copied().find(|x| x.as_str() == word)

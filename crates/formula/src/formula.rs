@@ -15,7 +15,7 @@ pub struct Formula {
 }
 
 impl Formula {
-    /// Parses `text`, in which the inputs have these names.
+    /// Parses `text` with inputs of these names.
     ///
     /// # Errors
     /// [`FormulaError`] with its place in the text.
@@ -48,7 +48,7 @@ impl Formula {
         self.tree.uses(index)
     }
 
-    /// Where in the text input `index` stands first, as a range of bytes.
+    /// First place of input `index` in the text, as a range of bytes.
     #[must_use]
     pub fn place_of(&self, index: usize) -> Option<(usize, usize)> {
         self.tree.place_of(index)

@@ -1,7 +1,7 @@
 use alloc::string::String;
 use core::fmt;
 
-/// What is wrong with a formula, and where.
+/// Error in a formula, with its place in the text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FormulaError {
     /// First byte of the place.

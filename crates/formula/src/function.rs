@@ -93,7 +93,7 @@ impl Function {
             Self::Multiply => x.1 * y.0 + x.0 * y.1,
             Self::Divide => (x.1 - value * y.1) / y.0,
             Self::Power => {
-                // Without the terms that are zero: the logarithm of a negative base has no value.
+                // Skip terms that are zero: the logarithm of a negative base has no value.
                 let base = if x.1 == 0.0 { 0.0 } else { x.1 * y.0 * power(x.0, y.0 - 1.0) };
                 let exponent = if y.1 == 0.0 { 0.0 } else { y.1 * value * libm::log(x.0) };
                 base + exponent
@@ -123,7 +123,7 @@ impl Function {
         (value, derivative)
     }
 
-    /// Value for these arguments; those that it does not have are ignored.
+    /// Value for these arguments; surplus ones are ignored.
     #[must_use]
     #[inline]
     pub(crate) fn value(self, [x, y, z]: [f64; 3]) -> f64 {
@@ -152,7 +152,7 @@ impl Function {
             Self::Power => power(x, y),
             Self::Less => f64::from(u8::from(x < y)),
             Self::Greater => f64::from(u8::from(x > y)),
-            // A missing value stays missing, unlike with `f64::min`.
+            // NaN is propagated, unlike with `f64::min`.
             Self::Min => {
                 if x <= y || x.is_nan() {
                     x

@@ -8,9 +8,9 @@
 //! | `token`, `parser` | text to syntax tree |
 //! | `unit` | exponents of metre, kilogram and second; parsing of `N s/m` |
 //! | `unit_check` | the unit of a formula |
-//! | `unknown_units` | units that follow from formulas |
+//! | `unknown_units` | inference of units from formulas |
 //! | `program` | evaluation without allocation, and derivatives |
-//! | `formula_error` | what is wrong, and where in the text |
+//! | `formula_error` | error with its place in the text |
 //!
 //! Written here because the crates for expressions give no position to an error of units, and use the platform's
 //! logarithms and powers; here they are those of `libm`, which give the same bits everywhere.

@@ -47,7 +47,7 @@ impl Parser<'_> {
         self.tokens.get(self.next).copied()
     }
 
-    /// Takes one of these symbols if it comes next.
+    /// Consumes one of these symbols if it comes next.
     fn take(&mut self, symbols: &[u8]) -> Option<u8> {
         match self.peek()?.kind {
             TokenKind::Symbol(symbol) if symbols.contains(&symbol) => {

@@ -39,8 +39,8 @@ impl Program {
         Ok(Self { steps })
     }
 
-    /// The value for these inputs, in the order of the names that the formula was parsed with; missing ones are NaN. Not a
-    /// number, or infinite, where the formula has no value.
+    /// The value for these inputs, in the order of the names that the formula was parsed with; missing ones are NaN. NaN or
+    /// infinite where the formula has no value.
     #[must_use]
     pub fn evaluate(&self, inputs: &[f64]) -> f64 {
         let mut stack = [0.0; MAX_STACK];

@@ -7,10 +7,10 @@ use crate::unit::Unit;
 use alloc::format;
 use alloc::vec::Vec;
 
-/// Most units that are not given.
+/// Largest number of unknown units.
 pub(crate) const MAX_UNKNOWN: usize = 4;
 
-/// A unit times powers of units that are not given.
+/// A unit times powers of unknown units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Dimension {
     pub unit: Unit,
@@ -40,7 +40,7 @@ impl Dimension {
     }
 }
 
-/// A walk through a formula. Every `Dimension` in `equal_to_none` must have no unit.
+/// State of the unit check of a formula. Every `Dimension` in `equal_to_none` must have no unit.
 pub(crate) struct Walk<'a> {
     pub inputs: &'a [Dimension],
     pub equal_to_none: Vec<Dimension>,

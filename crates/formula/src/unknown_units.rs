@@ -1,4 +1,4 @@
-//! Units that are not given, and follow from the equations in which their quantities occur.
+//! Inference of unknown units from the equations in which their quantities occur.
 
 use crate::formula::Formula;
 use crate::formula_error::FormulaError;
@@ -7,8 +7,8 @@ use crate::unit_check::{Dimension, MAX_UNKNOWN, Walk, dimensions};
 use alloc::format;
 use alloc::vec::Vec;
 
-/// The units of the last `unknown` inputs, so that every formula has its required unit: a given unit, times the unit of
-/// the state of an index where there is one. The other inputs have the units `known`.
+/// The units of the last `unknown` inputs for which every formula has its required unit: a given unit, times the unit of the
+/// state with an index, if there is one. The other inputs have the units `known`.
 ///
 /// # Errors
 /// The index of a formula with its error, or `None` in place of the index and the error when the unit of a state does not

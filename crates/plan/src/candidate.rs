@@ -8,7 +8,7 @@ use stylet_tissue::{EffectInfo, FitScale, Proposal};
 pub struct Candidate {
     /// Name: an effect's id, `none`, `unknown`.
     pub name: String,
-    /// Additional effects; the last one gives the name.
+    /// Additional effects; the candidate is named after the last one.
     pub effects: Vec<EffectTerm>,
     /// Probability before the next insertion.
     pub probability: f64,
@@ -59,7 +59,7 @@ pub fn typical_effect(info: &'static EffectInfo) -> Option<EffectTerm> {
         return None;
     }
     let shape = match info.proposal {
-        // The middle one of the shapes that a search starts from.
+        // Use the middle one of the start shapes.
         Proposal::LinearColumns(groups) => groups.get((groups.len().max(1) - 1) / 2).and_then(|g| g.first()),
         _ => None,
     };

@@ -1,6 +1,6 @@
 //! Errors of planning.
 
-/// Why there is no plan, and what would help.
+/// Error of planning, with the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum PlanError {
     /// A limit is not a positive number.
@@ -21,7 +21,7 @@ pub enum PlanError {
         /// What would help.
         remedy: String,
     },
-    /// The model does not give a finite force.
+    /// The model's force is not finite.
     #[error("the model gives no finite force along the motion: {0}")]
     NoForce(String),
     /// A diagnosis failed.

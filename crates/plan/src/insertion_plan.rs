@@ -22,10 +22,10 @@ pub struct Pair {
     pub nats_before: f64,
     /// The same with the planned insertion included.
     pub nats_after: f64,
-    /// Probability that the diagnosis names the true one of the two, before: one half when they are not
+    /// Probability, before the insertion, that the diagnosis names the true one of the two; 0.5 if they are not
     /// distinguishable.
     pub p_correct_before: f64,
-    /// The same after.
+    /// The same after the insertion.
     pub p_correct_after: f64,
     /// Whether some motion within the limits distinguishes them.
     pub distinguishable: bool,

@@ -3,7 +3,7 @@
 use crate::error::PlanError;
 use serde::{Deserialize, Serialize};
 
-/// Largest distance of the deepest position from zero in m: beyond, the unit is not the metre.
+/// Largest distance of the deepest position from zero in m; a larger number is in another unit.
 const MAX_DEPTH_M: f64 = 2.0;
 /// Largest speed in m/s.
 const MAX_SPEED_MPS: f64 = 1.0;

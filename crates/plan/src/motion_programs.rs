@@ -33,7 +33,7 @@ pub struct StartConditions {
     pub start_m: f64,
     /// Position of the surface in m.
     pub surface_m: f64,
-    /// Largest position in m whatever the limit: slightly beyond the tissue.
+    /// Largest position in m, slightly beyond the tissue, independent of the limits.
     pub max_depth_m: f64,
     /// Sampling rate in Hz.
     pub sample_hz: f64,

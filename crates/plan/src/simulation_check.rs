@@ -195,7 +195,7 @@ fn sensor_noise(state: &InformationState, assumed: &Scenario) -> f64 {
         .max(1e-4)
 }
 
-/// Whether a diagnosis names the candidate, and besides it only effects of the base model.
+/// Whether a diagnosis names the candidate and, apart from it, only effects of the base model.
 fn is_correct(diagnosis: &Diagnosis, state: &InformationState, which: usize) -> bool {
     let Some(candidate) = state.candidates.get(which) else { return false };
     let base: Vec<&str> = state.base.effects.iter().map(|e| e.info.id).collect();

@@ -1,5 +1,5 @@
-//! From the columns of a file to a recording: components along an axis, missing values, order of the time stamps, columns of
-//! other files.
+//! Builds a recording from the columns of a file: projects components on an axis, fills missing values, checks the time
+//! stamps, joins columns of other files.
 
 use crate::columns::{ColumnRole, MappedColumn, MappedColumns, Parts};
 use crate::differentiate::{DEFAULT_HALF_WIDTH_S, differentiate};
@@ -14,13 +14,13 @@ use crate::text::rows::RowsRead;
 use crate::text::source::SourceFile;
 use crate::time_order::{self, retain_rows};
 
-/// Rows that remain at least where others lack a value.
+/// Fewest rows that must remain without those that lack a value.
 const MIN_ROWS: usize = 3;
-/// Share of the rows with a force that lack another value, from which on rows of different topics alternate.
+/// Share of the rows with a force that lack another value, above which rows of different topics are assumed to alternate.
 const ALTERNATING_SHARE: f64 = 0.1;
 /// Lines that a note lists.
 const MAX_LINES: usize = 100;
-/// Consecutive integers from which on a time is a sample number.
+/// Consecutive integers from which a time column counts as a sample number.
 const MIN_SAMPLE_NUMBERS: usize = 100;
 
 /// A quantity with its rows, in SI units.
@@ -40,7 +40,7 @@ struct Table {
     notes: Vec<QualityNote>,
 }
 
-/// Makes the recording, with the notes on what was done.
+/// Builds the recording, with notes on what was done.
 ///
 /// # Errors
 /// [`RecordError`] with the line.
@@ -94,7 +94,7 @@ pub(crate) fn assemble(
     Ok((recording, notes))
 }
 
-/// Refuses fewer than two samples.
+/// Rejects fewer than two samples.
 pub(crate) fn check_sample_count(
     file: &SourceFile<'_>,
     samples: usize,
@@ -138,7 +138,7 @@ impl Table {
             .iter()
             .map(|column| columns.by_ref().take(column.indices.len()).collect())
             .collect();
-        // The axis of the motion serves for the force, too.
+        // The axis of the motion is used for the force, too.
         let of_position = mapped
             .columns
             .iter()

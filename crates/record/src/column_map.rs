@@ -87,7 +87,7 @@ impl Column {
         Self { name: name.into(), scale: Some(scale), ..Self::default() }
     }
 
-    /// A column in the unit that its name or the row of units says.
+    /// A column in the unit given by its name or the row of units.
     pub fn named(name: impl Into<String>) -> Self {
         Self { name: name.into(), ..Self::default() }
     }

@@ -1,4 +1,4 @@
-//! Which column holds which quantity: by a column map, by Stylet's names, or by names and units that are unmistakable.
+//! Assignment of columns to quantities: by a column map, by Stylet's names, or by unambiguous names and units.
 
 use std::path::Path;
 
@@ -162,7 +162,7 @@ pub(crate) fn map_columns(
     }
 }
 
-/// The columns for one role alone and the time, as another file holds them.
+/// The columns of one role and the time in another file.
 pub(crate) fn map_series(
     head: TableHead<'_>,
     map: &ColumnMap,
@@ -246,7 +246,7 @@ pub(crate) fn unit_of(head: TableHead<'_>, index: usize) -> Option<Unit> {
     head.units.get(index).copied().flatten().or_else(|| split_name(head.names.get(index)?).unit)
 }
 
-/// A column with the unit that the file says, where it is one of the quantity.
+/// A column with the unit in the file, if it is a unit of the quantity.
 fn mapped(head: TableHead<'_>, role: ColumnRole, indices: Vec<usize>, column: &Column) -> MappedColumn {
     let first = indices.first().copied().unwrap_or(0);
     let kind = head.kinds.get(first).copied().unwrap_or(ColumnKind::Number);
@@ -299,7 +299,7 @@ fn given(
         match place(head, name.trim())? {
             Some(index) => indices.push(index),
             None => {
-                // `wrench` stands for `wrench.1`, `wrench.2`, `wrench.3`.
+                // `wrench` denotes `wrench.1`, `wrench.2`, `wrench.3`.
                 let parts: Vec<usize> = (1..=4)
                     .filter_map(|k| head.names.iter().position(|n| *n == format!("{}.{k}", name.trim())))
                     .collect();
@@ -382,7 +382,7 @@ fn without_map(head: TableHead<'_>) -> Result<MappedColumns, RecordError> {
     Ok(found)
 }
 
-/// A column that is found by its name and unit. Columns in `taken` are other quantities.
+/// A column found by its name and unit. Columns in `taken` are already assigned.
 fn open(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Result<MappedColumn, RecordError> {
     let (own, what) = role.own();
     let column = Column::default();
@@ -419,7 +419,7 @@ impl MappedColumn {
     }
 }
 
-/// Columns whose name and unit say that they hold the quantity.
+/// Columns whose name and unit identify the quantity.
 fn unmistakable(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Vec<usize> {
     let (own, _) = role.own();
     let free = || (0..head.names.len()).filter(|index| !taken.contains(index));
@@ -445,7 +445,7 @@ fn unmistakable(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Vec<u
         .filter(|index| quantity_of(&split_name(&head.names[*index]).base) == Some(role.dimension()))
         .collect();
     let found = if by_name.is_empty() { with_unit } else { by_name };
-    // Columns that never hold a value are no candidates where others do.
+    // Columns without any value are candidates only if all are.
     let filled: Vec<usize> =
         found.iter().copied().filter(|index| kind(*index) != ColumnKind::Empty).collect();
     if filled.is_empty() { found } else { filled }

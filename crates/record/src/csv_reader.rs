@@ -36,8 +36,8 @@ pub fn read_csv(
     })
 }
 
-/// Reads a recording from the bytes of a file. `path` appears in messages, and other files that a column map names are looked
-/// for beside it.
+/// Reads a recording from the bytes of a file. `path` appears in messages, and other files that a column map names are searched
+/// in its folder.
 ///
 /// # Errors
 /// As [`read_csv`]; only the first obstacle.

@@ -7,9 +7,9 @@ use crate::error::RecordError;
 use crate::ground_truth::Truth;
 use crate::recording::{JOINTS, Recording, check_length};
 
-/// Writes a recording as CSV: `time_s,position_m,force_n`, then as far as there are any `velocity_mps`,
-/// `force_virtual_n`, `joint_torque_1_nm` to `joint_torque_7_nm`, the truth as `true_tip_force_n`, `true_elastic_n`, `true_friction_n`,
-/// `true_active_layer`, and the extra columns under their names.
+/// Writes a recording as CSV: `time_s,position_m,force_n`, then if present `velocity_mps`, `force_virtual_n`, `joint_torque_1_nm` to
+/// `joint_torque_7_nm`, the truth as `true_tip_force_n`, `true_elastic_n`, `true_friction_n`, `true_active_layer`, and the extra
+/// columns under their names.
 ///
 /// Numbers have the shortest decimal form that reads back to the same bits. A differentiated velocity is not written: the
 /// reader differentiates again. Extra columns are ignored by the reader; `NaN` in them is written as an empty field.

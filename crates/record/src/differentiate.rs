@@ -35,8 +35,8 @@ const EDGE_TOLERANCE: f64 = 1e-6;
 /// The slope of `position_m` over `time_s` at each sample (m/s), over windows of `+-half_width_s`; see the
 /// [module](self) for bandwidth and noise.
 ///
-/// `time_s` must strictly increase and be as long as `position_m` (the shorter length counts). Fewer than two samples
-/// give zeros. Takes time proportional to the number of samples, whatever the width.
+/// `time_s` must strictly increase and be as long as `position_m` (the shorter length counts). Fewer than two samples give
+/// zeros. The time is proportional to the number of samples and independent of the width.
 pub fn differentiate(time_s: &[f64], position_m: &[f64], half_width_s: f64) -> Vec<f64> {
     let mut velocity_mps = Vec::with_capacity(time_s.len().min(position_m.len()));
     let mut slopes = SlopeFilter::new(half_width_s);

@@ -22,7 +22,7 @@ pub fn downsample(recording: &Recording) -> Option<(Recording, QualityNote)> {
     }
     let step_s = recording.median_interval_s();
     let blocks = n as f64 * (step_s / BLOCK_S).min(1.0);
-    // Several samples per block add little computing time.
+    // Further samples per block add little computing time.
     let left = if blocks > MAX_BLOCKS { MAX_BLOCKS } else { MAX_SAMPLES as f64 };
     let together = (n as f64 / left).ceil() as usize;
     if together < 2 {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::RecordError;
 use crate::recording::{check_finite, check_length};
 
-/// What is true of a layer.
+/// True properties of a layer.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LayerTruth {
@@ -27,7 +27,7 @@ impl LayerTruth {
     }
 }
 
-/// A rupture as it happened in the simulated tissue.
+/// A true rupture in the simulated tissue.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrueRupture {

@@ -1,5 +1,5 @@
-//! Recordings of needle insertions: samples with units, ground truth of simulated ones, CSV and other file formats with
-//! column maps, data quality.
+//! Recordings of needle insertions: samples with units, ground truth of simulated ones, readers and writers for CSV and
+//! other formats with column maps, data quality checks.
 //!
 //! SI units everywhere; a public field carries its unit as a suffix. Signs: position is positive into the tissue, force
 //! is positive when it resists the insertion.
@@ -23,7 +23,7 @@
 //! | [`ground_truth`] | [`Truth`]: ground truth of a simulated recording |
 //! | [`column_map`] | [`ColumnMap`]: names, units and signs of the columns of another program's log |
 //! | [`csv_reader`], [`csv_writer`] | CSV in and out, bit for bit |
-//! | [`mod@inspect`] | what a file holds: layout, columns, sampling, units, a proposed column map |
+//! | [`mod@inspect`] | inspection of a file: layout, columns, sampling, units, a proposed column map |
 //! | [`units`] | units in names and rows of units |
 //! | [`long_recording`], [`disk_table`] | recordings longer than memory, on disk |
 //! | [`file_formats`] | spreadsheets, MATLAB, HDF5, Parquet, MCAP, ROS 2 bags (most with the feature `formats`) |
@@ -32,7 +32,7 @@
 //! | [`sensor_artefacts`] | samples that a force law cannot explain: sensor range, resolution, spikes |
 //! | [`mod@downsample`] | averaging of recordings that are too long for a diagnosis |
 //! | [`mod@differentiate`] | velocity from position on irregular time stamps |
-//! | [`error`] | [`RecordError`]: what is wrong, where, and the remedy |
+//! | [`error`] | [`RecordError`]: error, location and remedy |
 
 mod assemble;
 pub mod column_map;

@@ -30,7 +30,7 @@ use encoding_rs::{Encoding, UTF_8};
 const HEAD_BYTES: u64 = 1 << 18;
 /// Lines that a note lists.
 const MAX_LINES: usize = 100;
-/// Share of the rows with a missing value from which on they are read in memory, where rows of different topics are joined.
+/// Share of the rows with a missing value above which the file is read in memory, where rows of different topics are joined.
 const MAX_HOLE_SHARE: f64 = 0.1;
 /// Most consecutive rows out of time order that `--repair` handles, in memory.
 const MAX_DISORDER_ROWS: usize = 1 << 20;
@@ -44,7 +44,7 @@ pub struct LongRecording {
     /// Differentiated velocity, when none was measured.
     velocity: Option<DiskTable>,
     folder: PathBuf,
-    /// Lines of rows whose time stamps did not increase.
+    /// Lines of the rows dropped because their time stamps did not increase.
     dropped_lines: Vec<u64>,
     /// Notes of reading.
     notes: Vec<QualityNote>,
@@ -229,7 +229,7 @@ impl LongRecording {
                 writer.push(&row).map_err(temporary_file_error)
             },
         )?;
-        // What needs all rows at once, and errors about their order, are those of the reader in memory.
+        // Files that need all rows at once, and errors about their order, are left to the reader in memory.
         let odd_clock = counts_samples
             || epoch_unit(largest_s).is_some()
             || read.origins.first().is_some_and(Option::is_some);

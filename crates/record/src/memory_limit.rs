@@ -1,7 +1,7 @@
 //! Limit on the memory that reading a file may take, for the whole process.
 //!
 //! A file declares its size (rows of a column, cells of a sheet, bytes of a page), and a small damaged or malicious one may declare any
-//! number. Readers compare what a file declares, and what a pipe has delivered, with the limit before they allocate.
+//! number. Readers compare the declared size, or the bytes received from a pipe, with the limit before they allocate.
 
 use crate::error::RecordError;
 use std::fs::File;
@@ -32,7 +32,7 @@ pub(crate) fn limit_bytes() -> u64 {
     LIMIT_BYTES.load(Ordering::Relaxed)
 }
 
-/// Refuses to allocate more than the limit; `what` is the subject of the message.
+/// Rejects an allocation above the limit; `what` is the subject of the message.
 pub(crate) fn check(what: &str, bytes: u64) -> Result<(), String> {
     let limit = limit_bytes();
     if bytes <= limit {
@@ -70,7 +70,7 @@ pub(crate) fn read_limited(path: &Path) -> Result<Vec<u8>, RecordError> {
     Ok(bytes)
 }
 
-/// Refuses a text whose numbers would take more than the limit.
+/// Rejects a text whose numbers would take more than the limit.
 pub(crate) fn check_text(bytes: &[u8], path: &Path) -> Result<(), RecordError> {
     let lines = bytes.iter().filter(|byte| **byte == b'\n').count() as u64;
     let needed = (bytes.len() as u64).saturating_add(lines.saturating_mul(LINE_BYTES));

@@ -1,9 +1,8 @@
 //! Data quality of a recording.
 //!
-//! [`assess`] is the one list of checks for `enhance`, `diagnose`, repeats and data sets. A note is no error, and nothing is
-//! corrected. But a diagnosis from a recording with a *blocking* note ([`QualityNote::blocking`]) is refused by
-//! [`check_usable`], with the remedy. Each kind of note is described at [`QualityKind`]; its thresholds are constants of the
-//! module of the check.
+//! [`assess`] runs all checks for `enhance`, `diagnose`, repeats and data sets. A note is not an error, and nothing is
+//! corrected; but [`check_usable`] rejects recordings with a *blocking* note ([`QualityNote::blocking`]), with the remedy.
+//! Each kind of note is described at [`QualityKind`]; its thresholds are constants of the module of the check.
 
 mod constant_runs;
 mod copies;
@@ -83,7 +82,7 @@ pub(crate) fn assess_stream<A: SampleStream>(recording: &A) -> Result<Vec<Qualit
     Ok(notes)
 }
 
-/// Refuses recordings with a blocking note.
+/// Rejects recordings with a blocking note.
 ///
 /// # Errors
 /// [`RecordError::Unusable`] with every such recording, its message and remedy.

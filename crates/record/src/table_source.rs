@@ -1,4 +1,4 @@
-//! The columns of a file that a recording or a series needs, as they stand in it.
+//! Raw columns of a file that a recording or a series needs.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -26,7 +26,7 @@ pub struct ReadOptions {
     pub repair: bool,
 }
 
-/// Columns as a file has them: parts of the mapped columns one after another, NaN for missing values.
+/// Raw columns of a file: parts of the mapped columns one after another, NaN for missing values.
 #[derive(Debug, Default)]
 pub(crate) struct RawTable {
     pub columns: Vec<Vec<f64>>,
@@ -48,7 +48,7 @@ pub(crate) fn read_bytes(path: &Path) -> Result<Vec<u8>, RecordError> {
     Ok(bytes)
 }
 
-/// What is read from a file.
+/// Selection of the columns to read.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Select<'a> {
     /// All columns of a recording.
@@ -58,7 +58,7 @@ pub(crate) enum Select<'a> {
 }
 
 impl Select<'_> {
-    /// The map with which a series is looked for in its file.
+    /// The map for a series in another file.
     fn series_map(self, map: Option<&ColumnMap>) -> Option<ColumnMap> {
         let Self::Series(..) = self else { return None };
         // Layout and encoding of the first file are not those of the second one.

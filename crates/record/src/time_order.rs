@@ -1,4 +1,4 @@
-//! Order of the time stamps: check, and repair without a silent loss of measurements.
+//! Order of the time stamps: check and repair; dropped rows are always reported.
 
 use crate::error::RecordError;
 use crate::quality::{QualityKind, QualityNote, repaired_rows};
@@ -6,13 +6,13 @@ use crate::text::source::SourceFile;
 
 /// Share of the rows that a repair may drop.
 pub(crate) const MAX_DROPPED_SHARE: f64 = 0.01;
-/// Share of rows that repeat the time stamp before them, from which on the stamps come in bursts and are spread.
+/// Share of rows with a repeated time stamp above which the samples arrive in bursts and their stamps are spread.
 const BURST_SHARE: f64 = 0.01;
 /// Time to the next burst, in medians, above which there is a gap and the median is used instead.
 const GAP_BURSTS: f64 = 3.0;
-/// Rows behind a step back from which on they are a recording of their own.
+/// Rows after a step back from which they count as a second recording.
 const MIN_SECOND_RUN: usize = 50;
-/// Step back, as a share of the time before it, from which on a second recording begins.
+/// Step back, as a share of the time before it, from which a second recording begins.
 const SECOND_RUN_SHARE: f64 = 0.1;
 
 /// Error of the first time stamp that does not increase.
@@ -58,7 +58,7 @@ pub(crate) fn second_run_row(time_s: &[f64]) -> Option<usize> {
     let (mut latest, first) = (f64::NEG_INFINITY, time_s.first().copied()?);
     for (row, time) in time_s.iter().enumerate() {
         if latest - time > SECOND_RUN_SHARE * (latest - first) && row > 0 {
-            // A single stamp far ahead is no recording before: the rows behind the step fall behind many rows.
+            // A single stamp far ahead does not count: the rows after the step must be earlier than many rows before it.
             let overtaken = time_s[..row].iter().rev().take(MIN_SECOND_RUN).filter(|t| *t > time).count();
             let follow = &time_s[row..];
             let below = follow.iter().take(MIN_SECOND_RUN).filter(|t| **t < latest).count();
@@ -86,12 +86,12 @@ fn second_run(
     }))
 }
 
-/// What a repair changes.
+/// Changes made by a repair.
 #[derive(Debug, Default)]
 pub(crate) struct Repaired {
     /// New time stamps of all rows.
     pub time_s: Option<Vec<f64>>,
-    /// Rows that stay.
+    /// Rows that are kept.
     pub keep: Option<Vec<bool>>,
     pub notes: Vec<QualityNote>,
 }
@@ -132,7 +132,7 @@ pub(crate) fn repair(
     Ok(repaired)
 }
 
-/// Refuses to drop more than [`MAX_DROPPED_SHARE`] of the rows; `offsets` are those of the dropped ones.
+/// Rejects dropping more than [`MAX_DROPPED_SHARE`] of the rows; `offsets` are those of the dropped ones.
 pub(crate) fn check_dropped(
     file: &SourceFile<'_>,
     offsets: &[usize],

@@ -117,7 +117,7 @@ pub fn parse_unit(text: &str) -> Option<Unit> {
     if text.is_empty() || text.chars().count() > 24 {
         return None;
     }
-    // Case decides only between the prefixes m and M, of which M occurs in no recording.
+    // Case distinguishes only the prefixes m and M, and M does not occur in recordings.
     let lower = text.to_lowercase();
     UNITS.iter().find(|(_, spellings)| spellings.contains(&lower.as_str())).map(|(unit, _)| *unit)
 }
@@ -273,7 +273,7 @@ const FORCE_WORDS: &[&str] = &[
 const VELOCITY_WORDS: &[&str] =
     &["velocity", "vel", "speed", "v", "vz", "geschwindigkeit", "vitesse", "prędkość", "velocidad"];
 
-/// Dimension of the quantity that a name without unit stands for.
+/// Dimension of the quantity that a name without unit denotes.
 #[must_use]
 pub fn quantity_of(base: &str) -> Option<Dimension> {
     let lower = base.to_lowercase();

@@ -47,7 +47,7 @@ pub struct Series {
     pub x: Vec<f64>,
     /// Ordinates; a value that is not finite leaves a gap.
     pub y: Vec<f64>,
-    /// Hidden until the reader switches it on.
+    /// Hidden until switched on.
     pub hidden: bool,
 }
 
@@ -180,7 +180,7 @@ pub struct Span {
     pub colour: Colour,
 }
 
-/// A needle that moves through layers beside a chart over time, while the reader plays or drags the time.
+/// Animation of the needle in the layers, next to a chart over time, driven by playing or dragging the time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Needle {
     /// Time in s, increasing, as the chart's abscissa.

@@ -16,12 +16,12 @@ const PAGE_JS: [&str; 5] = [
     include_str!("../assets/charts.js"),
     include_str!("../assets/selftest.js"),
 ];
-/// Runs first, so that the tests see every script error.
+/// Runs first, so that tests catch every script error.
 const ERROR_TRAP: &str = "addEventListener('error',function(e){var d=document.documentElement;\
 d.dataset.errors=(d.dataset.errors||'')+e.message+'\\n'});";
 /// Forbids all network access.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
-/// A cell with more characters may wrap at a minimum width of its own; a number is otherwise kept on one line.
+/// A cell with more characters may wrap at a minimum width; shorter cells, such as numbers, stay on one line.
 const LONG_TEXT: usize = 48;
 const LONG_NUMBER: usize = 14;
 /// A longer text without spaces, a path of a field or score, may break after `_` and `.`.

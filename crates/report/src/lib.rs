@@ -1,6 +1,6 @@
 //! Self-contained HTML reports and SVG figures.
 //!
-//! Draws results and computes nothing. It offers four things:
+//! This crate draws results and does not compute any. It has four parts:
 //!
 //! - [`Page`]: a page builder (charts, tables, score tiles, text, code). [`Page::to_html`] gives one self-contained file whose
 //!   charts zoom and pan together.

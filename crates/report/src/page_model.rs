@@ -2,10 +2,10 @@
 
 use crate::chart_model::Chart;
 
-/// Judgement of a value. Drawn as a colour and a sign, so that it does not depend on colour vision.
+/// Rating of a value, drawn as a colour and a sign, so that it does not depend on colour vision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Status {
-    /// Not judged.
+    /// Not rated.
     #[default]
     Plain,
     /// Within the good range.
@@ -17,7 +17,7 @@ pub enum Status {
 }
 
 impl Status {
-    /// `Good` up to `good`, `Warn` up to `warn`, `Bad` beyond; not judged when there is no finite value.
+    /// `Good` up to `good`, `Warn` up to `warn`, `Bad` beyond; not rated without a finite value.
     #[must_use]
     pub fn at_most(value: f64, good: f64, warn: f64) -> Self {
         if !value.is_finite() {
@@ -44,7 +44,7 @@ impl Status {
 /// One figure of a scorecard.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tile {
-    /// What it is.
+    /// Label.
     pub label: String,
     /// The figure, with unit.
     pub value: String,
@@ -55,7 +55,7 @@ pub struct Tile {
 }
 
 impl Tile {
-    /// A tile that is not judged.
+    /// A tile without rating.
     #[must_use]
     pub fn new(label: impl Into<String>, value: impl Into<String>, detail: impl Into<String>) -> Self {
         Self { label: label.into(), value: value.into(), detail: detail.into(), status: Status::Plain }

@@ -1,6 +1,5 @@
-//! What the algorithm's switches do, for the record: to the letter, the derivative on drops, resets and
-//! re-weighting left out; the offline estimate with and without the online drop; and where Kelvin-Voigt's
-//! stiffness errors come from.
+//! Effect of the algorithm's switches: the literal algorithm, derivative on drops, resets and re-weighting left out; the
+//! offline estimate with and without the online drop; origin of Kelvin-Voigt's stiffness errors.
 
 use crate::algorithm_variant::{Ablation, Sensor, Setup};
 use crate::all_runs::Study;
@@ -14,7 +13,7 @@ use crate::value_source::Sourced;
 use serde::Serialize;
 use stylet_report::{Cell, Section, Table, percent, significant};
 
-/// A way of running that is compared.
+/// A compared variant of the algorithm.
 struct Way {
     name: &'static str,
     setup: Setup,
@@ -65,12 +64,12 @@ fn percents(errors: &[Option<f64>]) -> String {
     errors.iter().map(text).collect::<Vec<_>>().join(" / ")
 }
 
-/// What one way of running makes of an experiment: a row of `switches.json`.
+/// Result of one variant on an experiment: a row of `switches.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Ablated {
     /// Experiment.
     pub experiment: &'static str,
-    /// What was switched.
+    /// The switch.
     pub name: &'static str,
     /// Noise seeds.
     pub seeds: usize,
@@ -80,11 +79,11 @@ pub struct Ablated {
     pub missed: usize,
     /// and false ones.
     pub false_alarms: usize,
-    /// Median over the seeds of the relative error of K, layer by layer; none where nothing was estimated.
+    /// Median over the seeds of the relative error of K, layer by layer; `None` without an estimate.
     pub stiffness_error: Vec<Option<f64>>,
     /// Cumulative friction at the end over the true one.
     pub cumulative_ratio: Option<Interval>,
-    /// Enhanced force off by, relative.
+    /// Relative error of the enhanced force.
     pub enhancement: Option<Interval>,
     /// RMS reconstruction error in N.
     pub reconstruction_rms_n: Option<Interval>,
@@ -111,7 +110,7 @@ fn ablated(study: &Study, case: Case, way: &Way) -> Ablated {
     }
 }
 
-/// Every way of running on every experiment, for the record.
+/// All variants on all experiments.
 #[must_use]
 pub fn record(study: &Study) -> Vec<Ablated> {
     CASES.iter().flat_map(|case| WAYS.iter().map(|way| ablated(study, *case, way))).collect()
@@ -205,7 +204,7 @@ fn offline(study: &Study) -> Sourced {
     })
 }
 
-/// Kelvin-Voigt by least squares over the whole layer puts the local friction into K: the error is `b v / K`.
+/// Kelvin-Voigt fitted by least squares over the whole layer attributes the local friction to K: the error is `b v / K`.
 fn kelvin_voigt(study: &Study) -> Sourced {
     let case = Case::LatexConstant;
     let rows = [
@@ -238,7 +237,7 @@ fn kelvin_voigt(study: &Study) -> Sourced {
     })
 }
 
-/// The section of the page; in a study that asks, it notes what is looked up.
+/// The section of the page; in a planning study it records the runs that it needs.
 #[must_use]
 pub fn section(study: &Study) -> Section {
     let mut section = Section::new("Switches of the algorithm")

@@ -14,7 +14,7 @@ pub enum Setup {
     Published,
     /// Surface and depths known (the paper's 3-D model), the published defaults; a layer ends at its far face at the latest.
     KnownDepth,
-    /// As `Tuned`, without the completions that Stylet needs.
+    /// As `Tuned`, without the completions of this project.
     Literal,
     /// As `Tuned`, with the derivative acting on the falling force, as in the supplement, instead of the rising one, as in the
     /// laboratory.
@@ -44,7 +44,7 @@ pub enum Ablation {
     Trace,
 }
 
-/// One way of running the algorithm.
+/// A variant of the algorithm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Variant {
     /// Kelvin-Voigt instead of multi-layer.
@@ -124,7 +124,7 @@ impl Variant {
     }
 }
 
-/// The sensor whose force the algorithm takes.
+/// The sensor whose force the algorithm processes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Sensor {
     /// The force/torque sensor.

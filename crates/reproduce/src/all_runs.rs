@@ -1,7 +1,7 @@
 //! All runs over all seeds, once: claims, tables and figures only read them.
 //!
-//! What has to be run is what they ask for: they are asked first, of a study without any runs, and every
-//! combination that they look up is noted.
+//! The required runs are found by evaluating these on a study without runs first, which records every combination that is
+//! looked up.
 
 use crate::algorithm_variant::{Ablation, Sensor, Setup, Variant};
 use crate::assumed_value_changes::Change;
@@ -16,14 +16,13 @@ use stylet_scenario::InputError;
 use stylet_stats::parallel::*;
 use stylet_testbed::SimulateError;
 
-/// Noise of the force/torque sensor, in mN, where nothing else is said: the laboratory's standard deviation of
-/// the error in ordinary insertion.
+/// Default noise of the force/torque sensor in mN: the laboratory's standard deviation of the error in ordinary insertion.
 pub const NOISE_MN: u32 = 10;
-/// Noise levels of the comparison with the truth, in mN: half, as it is, twice (that of the shipped
-/// scenarios), and one at which the algorithm breaks down.
+/// Noise levels in mN of the comparison with the truth: half the default, the default, twice (as in the shipped scenarios),
+/// and one at which the algorithm breaks down.
 pub const NOISE_LEVELS_MN: [u32; 4] = [5, 10, 20, 50];
 
-/// Why nothing could be reproduced: a mistake in what is shipped.
+/// Error of a reproduction, caused by a mistake in the shipped files.
 #[derive(Debug, thiserror::Error)]
 pub enum ReproduceError {
     /// A shipped scenario is wrong.
@@ -32,7 +31,7 @@ pub enum ReproduceError {
     /// A shipped scenario cannot be simulated.
     #[error(transparent)]
     Simulate(#[from] SimulateError),
-    /// No such runs were made.
+    /// The requested runs were not made.
     #[error("no runs of {0}")]
     NotRun(String),
     /// The claims cannot be written.
@@ -40,18 +39,18 @@ pub enum ReproduceError {
     Json(#[from] serde_json::Error),
 }
 
-/// What is recorded: an experiment, perhaps with a changed number, and the noise of the force/torque sensor.
+/// Key of a recording: experiment, change of an assumed value if any, and noise of the force/torque sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Recorded {
     /// Experiment.
     pub case: Case,
-    /// What was changed in it.
+    /// The changed value, if any.
     pub change: Option<Change>,
     /// Noise of the force/torque sensor in mN.
     pub noise_mn: u32,
 }
 
-/// What was run: a recording, the sensor that is listened to, the way of running.
+/// Key of a run: recording, sensor, and variant of the algorithm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Key {
     /// The recording.
@@ -62,7 +61,7 @@ pub struct Key {
     pub variant: Variant,
 }
 
-/// What somebody looked up, and for how many seeds.
+/// Lookups of a planning study, with their number of seeds.
 #[derive(Clone, Debug, Default)]
 struct Wanted {
     runs: BTreeMap<Key, u64>,
@@ -85,7 +84,7 @@ pub struct Study {
 /// Recordings that share one simulation, or on the arm the seeds' simulations.
 type Group = (Case, Option<Change>);
 
-/// One recording of one seed, with all that is asked of it.
+/// One recording of one seed, with all requested runs.
 struct Job<'a> {
     recorded: Recorded,
     once: &'a Insertion,
@@ -94,14 +93,14 @@ struct Job<'a> {
     offline: bool,
 }
 
-/// What a job gives.
+/// Result of a job.
 #[derive(Default)]
 struct Done {
     runs: Vec<(Key, Outcome)>,
     offline: Option<(Recorded, Offline)>,
 }
 
-/// A plan: everything that was asked for.
+/// A plan: all requested runs.
 #[derive(Clone, Debug)]
 pub struct Plan {
     first_seed: u64,
@@ -110,7 +109,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The recordings with their number of seeds, dear ones first, so that no thread is left alone at the end.
+    /// The recordings with their number of seeds, expensive ones first, so that all threads finish at about the same time.
     fn recordings(&self) -> Vec<(Recorded, u64)> {
         let mut all: BTreeMap<Recorded, u64> = self.wanted.offline.clone();
         for (key, seeds) in &self.wanted.runs {
@@ -122,7 +121,7 @@ impl Plan {
         list
     }
 
-    /// Number of recordings over all seeds: what progress counts.
+    /// Number of recordings over all seeds, for progress.
     #[must_use]
     pub fn recordings_in_all(&self) -> u64 {
         self.recordings().iter().map(|(_, seeds)| seeds).sum()
@@ -149,7 +148,7 @@ impl Plan {
         Ok(made.into_iter().collect())
     }
 
-    /// What has to be tuned, for which sensors, and whether the triggered reset's threshold too.
+    /// The required tunings by sensor, and whether the threshold of the triggered reset is tuned too.
     fn to_tune(&self) -> BTreeMap<Recorded, BTreeMap<Sensor, bool>> {
         let mut all: BTreeMap<Recorded, BTreeMap<Sensor, bool>> = BTreeMap::new();
         for key in self.wanted.runs.keys().filter(|k| k.variant.is_tuned()) {
@@ -166,19 +165,19 @@ fn unchanged_on_arm(recorded: Recorded) -> Recorded {
 }
 
 impl Study {
-    /// A study without runs that notes what is asked of it.
+    /// A planning study: without runs, it records the lookups.
     #[must_use]
     pub fn asking(first_seed: u64, seeds: u64) -> Self {
         Self { first_seed, seeds, wanted: Some(Mutex::default()), ..Self::default() }
     }
 
-    /// Whether it only notes what is asked of it.
+    /// Whether this is a planning study.
     #[must_use]
     pub const fn is_asking(&self) -> bool {
         self.wanted.is_some()
     }
 
-    /// What was asked of a study made by [`Study::asking`].
+    /// The lookups of a study made by [`Study::asking`].
     #[must_use]
     pub fn plan(self) -> Plan {
         let wanted = self.wanted.and_then(|w| w.into_inner().ok()).unwrap_or_default();
@@ -239,7 +238,7 @@ impl Study {
         Ok(Self { first_seed: first, seeds: plan.seeds, runs, offline, tunings, wanted: None })
     }
 
-    /// The outcomes of one combination, by seed, at most `seeds` of them; notes it in a study that asks.
+    /// The outcomes of one combination, by seed, at most `seeds` of them; recorded in a planning study.
     #[must_use]
     pub fn runs(&self, key: Key, seeds: u64) -> &[Outcome] {
         let seeds = seeds.min(self.seeds);
@@ -263,7 +262,7 @@ impl Study {
         &all[..all.len().min(seeds as usize)]
     }
 
-    /// How a phantom's detection was tuned; the published defaults where nothing was.
+    /// The tuned thresholds of a phantom; the published defaults if it was not tuned.
     #[must_use]
     pub fn tuning(&self, recorded: Recorded, sensor: Sensor) -> Tuning {
         self.tunings.get(&(unchanged_on_arm(recorded), sensor)).copied().unwrap_or_default()
@@ -275,7 +274,7 @@ impl Study {
     }
 }
 
-/// What was tuned, and how.
+/// Tuned recordings with their thresholds.
 type Tuned = ((Recorded, Sensor), Tuning);
 
 /// The tunings of a recording; on the arm one simulation of each tuning seed serves every sensor.
@@ -317,7 +316,7 @@ fn one(
     tunings: &BTreeMap<(Recorded, Sensor), Tuning>,
 ) -> Result<Done, ReproduceError> {
     let mut done = Done::default();
-    // On the arm the torques' noise moves the needle: each seed is an insertion of its own.
+    // On the arm the torque noise moves the needle, so each seed is a separate insertion.
     let fresh;
     let insertion = if job.recorded.case.on_arm() && job.seed != first_seed {
         fresh = Insertion::of(&job.once.scenario, job.seed)?;

@@ -1,10 +1,10 @@
-//! The numbers of a phantom that are not the paper's, and what halving or doubling them makes of it.
+//! Assumed values of the phantoms, which the paper does not give, and scenarios in which they are halved or doubled.
 
 use crate::paper_experiments::Case;
 use serde::Serialize;
 use stylet_scenario::{Motion, Scenario, Sensor};
 
-/// A number that had to be chosen, or taken from elsewhere, because the paper does not give it.
+/// A value that the paper does not give: assumed, or taken from another source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Number {
     /// Noise of the force/torque sensor.
@@ -33,20 +33,20 @@ pub enum Number {
     AbdomenStiffness,
     /// b of the abdomen's three layers.
     AbdomenFriction,
-    /// Way in air between start and contact.
+    /// Travel in air between start and contact.
     Start,
-    /// Time that the motion goes on for after the target has been passed.
+    /// Duration of the motion after the target is passed.
     Behind,
     /// Noise of the arm's joint torques.
     TorqueNoise,
-    /// `s1` with which the virtual sensor is listened to.
+    /// `s1` for the virtual sensor.
     VirtualSigma,
 }
 
-/// A number halved or doubled.
+/// A halved or doubled assumed value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Change {
-    /// Which number.
+    /// The assumed value.
     pub number: Number,
     /// Doubled instead of halved.
     pub doubled: bool,
@@ -80,7 +80,7 @@ impl Number {
         Number::VirtualSigma,
     ];
 
-    /// As it stands in the protocols.
+    /// Name as in the protocols.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -110,8 +110,8 @@ impl Number {
         [Change { number: self, doubled: false }, Change { number: self, doubled: true }]
     }
 
-    /// Whether the number enters a recording. The noise of the force/torque sensor is a key of its own, and `s1`
-    /// belongs to the algorithm.
+    /// Whether the value affects a recording. The noise of the force/torque sensor is a separate key, and `s1` belongs to
+    /// the algorithm.
     #[must_use]
     pub const fn enters(self, case: Case) -> bool {
         match self {
@@ -194,7 +194,7 @@ impl Change {
     }
 }
 
-/// When the ideal motion passes the last far face, in s; `None` when it never does.
+/// Time in s at which the ideal motion passes the last far face; `None` if it never does.
 fn out_of_the_target_s(scenario: &Scenario) -> Option<f64> {
     let tissue = &scenario.tissue;
     let far_m = tissue.surface_m + tissue.layers.iter().map(|l| l.thickness_m).sum::<f64>();

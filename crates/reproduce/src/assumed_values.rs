@@ -1,4 +1,4 @@
-//! All chosen numbers, with the verdicts that hang on them.
+//! All assumed values, with the verdicts that depend on them.
 
 use crate::algorithm_variant::{Ablation, Sensor};
 use crate::all_runs::Study;
@@ -11,7 +11,7 @@ use crate::study_conditions::View;
 use crate::value_source::{Class, Sourced, inputs};
 use stylet_report::{Cell, Section, Status, Table};
 
-/// Values of a number in the experiments that it enters, each once.
+/// Distinct values of an assumed value in the experiments that use it.
 fn values(number: Number) -> (String, String) {
     let (mut values, mut classes): (Vec<String>, Vec<&str>) = (Vec::new(), Vec::new());
     for case in Case::ALL {
@@ -58,12 +58,12 @@ fn row(number: Number, claims: &[Claim]) -> Vec<Cell> {
     ]
 }
 
-/// How far the interval is from the bar: what the bar could be without another verdict.
+/// Distance of the interval from the bar: the range of bars with the same verdict.
 fn room(effect: &Effect) -> String {
     effect.interval.map_or("–".to_owned(), |_| effect.words())
 }
 
-/// What becomes of a claim's effect with other numbers, and whether its verdict hangs on them.
+/// A claim's effect with changed values, and whether its verdict depends on them.
 fn hangs(claims: &[Claim], id: &str, tried: &[(&str, Effect)]) -> String {
     let Some(primary) = claims.iter().find(|c| c.id == id).and_then(|c| c.primary.as_ref()) else {
         return String::new();
@@ -81,7 +81,7 @@ fn share(runs: &[&[Outcome]], holds: impl Fn(&Outcome) -> bool) -> Effect {
     Measured { scale: Scale::Share, parts: runs.iter().map(part).collect() }.effect()
 }
 
-/// Claim d with other ideas of what is visible.
+/// Claim d with other thresholds of visibility.
 fn visibly(study: &Study, claims: &[Claim]) -> String {
     let runs = View::primary(study).kv(Case::Gel25Sinusoidal);
     let with = |times: f64| {
@@ -91,7 +91,7 @@ fn visibly(study: &Study, claims: &[Claim]) -> String {
     hangs(claims, "d", &[("halved", with(0.5)), ("doubled", with(2.0))])
 }
 
-/// Claims e and f1 when a rupture has to be found within half a second.
+/// Claims e and f1 if a rupture must be found within 0.5 s.
 fn sooner(study: &Study, claims: &[Claim]) -> String {
     use Sensor::{ForceTorque, Virtual};
     let view = View::primary(study);
@@ -113,7 +113,7 @@ fn sooner(study: &Study, claims: &[Claim]) -> String {
     format!("{e}; {}", hangs(claims, "f1", &[("halved", of(&either))]))
 }
 
-/// The claims whose effect would exist, or not, if other shares of the seeds were enough.
+/// The claims whose effect would exist, or not, with another required share of seeds.
 fn enough(claims: &[Claim]) -> String {
     let others = |share: f64| {
         let ids: Vec<&str> = claims

@@ -1,6 +1,6 @@
-//! The protocols of the claims, as they were written before the numbers: `claims/*.md`.
+//! The protocols of the claims, written before the runs: `claims/*.md`.
 
-/// A protocol, read.
+/// A parsed protocol.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Protocol {
     /// `b1`.
@@ -39,7 +39,7 @@ impl Protocol {
         self.sections.iter().find(|(h, _)| h == heading).map_or("", |(_, text)| text)
     }
 
-    /// The items of a list; none for `none`.
+    /// The items of a list; empty for `none`.
     #[must_use]
     pub fn list(&self, heading: &str) -> Vec<&str> {
         self.section(heading).lines().filter_map(|l| l.strip_prefix("- ")).collect()

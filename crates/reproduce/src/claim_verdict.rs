@@ -1,27 +1,27 @@
-//! The rule by which a primary condition becomes a verdict: one place for all claims (`claims/README.md`).
+//! The rule from the primary condition to the verdict, the same for all claims (`claims/README.md`).
 
 use crate::assumed_value_changes::Change;
 use crate::effect_size::{Bar, Effect, Says};
 use serde::Serialize;
 
-/// What the testbed says of a claim.
+/// Verdict on a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// The primary condition supports it, and no number of ours decides.
+    /// The primary condition supports it, independently of the assumed values.
     Supported,
-    /// The primary condition contradicts it, and no number of ours decides.
+    /// The primary condition contradicts it, independently of the assumed values.
     Contradicted,
-    /// A number that we chose decides.
+    /// The verdict depends on an assumed value.
     Assumed,
-    /// The interval holds the bar, or too few seeds give a value.
+    /// The interval contains the bar, or too few seeds give a value.
     Undecided,
-    /// No simulation can say.
+    /// Not testable by simulation.
     Untestable,
 }
 
 impl Verdict {
-    /// In a word.
+    /// Name of the verdict.
     #[must_use]
     pub const fn as_str(self) -> &'static str {
         match self {
@@ -34,12 +34,12 @@ impl Verdict {
     }
 }
 
-/// A number of ours halved or doubled, and what becomes of the primary effect.
+/// A halved or doubled assumed value, and the primary effect with it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trial {
-    /// What was changed.
+    /// The change.
     pub change: Change,
-    /// The effect then.
+    /// The effect with the change.
     pub effect: Effect,
     /// Whether it lies on the other side of the bar, or exists only with or only without the change.
     pub decides: bool,
@@ -54,8 +54,7 @@ impl Trial {
     }
 }
 
-/// The verdict: what the primary condition says, unless a number of ours decides. Sensitivity conditions are
-/// not asked.
+/// The verdict of the primary condition, unless it depends on an assumed value. Sensitivity conditions are not used.
 #[must_use]
 pub fn verdict(primary: Says, trials: &[Trial]) -> Verdict {
     if trials.iter().any(|t| t.decides) {

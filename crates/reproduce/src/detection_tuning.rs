@@ -9,7 +9,7 @@ use stylet_score::match_ruptures;
 
 /// First of the noise seeds that are used only for tuning.
 pub const TUNING_FIRST_SEED: u64 = 1_000_001;
-/// Number of tuning seeds where one simulation serves all of them.
+/// Number of tuning seeds if one simulation can be used for all.
 pub const TUNING_SEEDS: u64 = 10;
 /// Number of tuning seeds on the arm.
 pub const TUNING_SEEDS_ARM: u64 = 4;

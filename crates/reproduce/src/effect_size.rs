@@ -1,4 +1,4 @@
-//! Effect sizes: what a claim is about as one number with its interval over the seeds, and the bar.
+//! Effect sizes: the quantity of a claim as one number with its interval over the seeds, compared with a bar.
 
 use crate::seed_interval::{Interval, geometric_mean, mean, share};
 use serde::{Serialize, Serializer};
@@ -7,12 +7,12 @@ use stylet_report::significant;
 /// Share of the seeds that must give a value; with fewer there is no effect.
 pub const ENOUGH: f64 = 0.8;
 
-/// One of the experiments that an effect is made of: a value per seed, or none.
+/// One experiment of an effect: a value per seed, or none.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// Which experiment.
+    /// The experiment.
     pub name: String,
-    /// By seed.
+    /// Values by seed.
     pub values: Vec<Option<f64>>,
 }
 
@@ -24,7 +24,7 @@ impl Part {
     }
 }
 
-/// How the experiments of one seed become one value, and the seeds one effect.
+/// Aggregation over the experiments of a seed, and over the seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
     /// Geometric mean of ratios, over experiments that have one.
@@ -40,7 +40,7 @@ pub enum Scale {
 }
 
 impl Scale {
-    /// One value of the experiments of a seed.
+    /// Aggregates the experiments of a seed.
     fn of_seed(self, values: &[Option<f64>]) -> Option<f64> {
         let some: Vec<f64> = values.iter().copied().flatten().collect();
         if some.is_empty() {
@@ -66,10 +66,10 @@ impl Scale {
     }
 }
 
-/// What was measured under a condition.
+/// Measurements under a condition.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measured {
-    /// How it is put together.
+    /// Aggregation.
     pub scale: Scale,
     /// The experiments.
     pub parts: Vec<Part>,
@@ -128,7 +128,7 @@ impl Effect {
     }
 }
 
-/// On which side of its bar an effect lies.
+/// Position of an effect relative to its bar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Says {
@@ -136,7 +136,7 @@ pub enum Says {
     Supports,
     /// The whole interval on the other side.
     Contradicts,
-    /// The interval holds the bar, or there is no effect.
+    /// The interval contains the bar, or there is no effect.
     Undecided,
 }
 
@@ -152,7 +152,7 @@ impl Says {
     }
 }
 
-/// What a claim asks of its effect.
+/// Condition of a claim on its effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Bar {
     /// Above a number.
@@ -183,7 +183,7 @@ impl Bar {
         }
     }
 
-    /// What an effect says.
+    /// Position of an effect relative to this condition.
     #[must_use]
     pub fn judge(self, effect: &Effect) -> Says {
         let Some(Interval { low, high, .. }) = effect.interval else { return Says::Undecided };
@@ -201,7 +201,7 @@ impl Bar {
         }
     }
 
-    /// The side on which the value itself lies; none without an effect.
+    /// The side of the point estimate; `None` without an effect.
     #[must_use]
     pub fn side(self, effect: &Effect) -> Option<bool> {
         effect.interval.map(|i| self.holds(i.value))

@@ -1,5 +1,4 @@
-//! The question that the paper leaves open: how good are K and b against the truth, per model, motion,
-//! noise and sensor.
+//! Accuracy of K and b against the ground truth by model, motion, noise and sensor, which the paper does not report.
 
 use crate::algorithm_variant::{Ablation, Sensor, Setup};
 use crate::all_runs::{NOISE_LEVELS_MN, NOISE_MN, Study};
@@ -15,7 +14,7 @@ use stylet_score::EstimateError;
 
 type Row = (String, Case, u32, Sensor, Setup);
 
-/// The virtual sensor is listened to with our detection: with the published range little is found.
+/// The virtual sensor uses the assumed detection thresholds: with the published range few ruptures are found.
 const fn setup(sensor: Sensor) -> Setup {
     match sensor {
         Sensor::ForceTorque => Setup::Tuned,
@@ -103,7 +102,7 @@ fn strips(study: &Study, friction: bool) -> String {
         ("abdomen, F/T", Case::Abdomen, Sensor::ForceTorque, 2),
         ("abdomen, virtual", Case::AbdomenArm, Sensor::Virtual, 2),
     ];
-    // What is off by more than a factor of four is drawn at four: it is wrong, however wrong.
+    // Ratios above four are drawn at four.
     let most = 4.0;
     let groups = shown
         .iter()

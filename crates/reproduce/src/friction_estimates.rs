@@ -23,10 +23,10 @@ pub const PHANTOMS: [Phantom; 3] = [
 /// Constant and sinusoidal.
 pub const MOTIONS: [&str; 2] = ["constant", "sinusoidal"];
 
-/// How friction is estimated.
+/// Method of the friction estimate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// Least squares over the whole layer, all force being friction (supplement sec. III).
+    /// Least squares over the whole layer with all force as friction (supplement sec. III).
     Offline,
     /// Least squares of K and b over the whole layer, without the drop.
     OfflineBoth,
@@ -34,7 +34,7 @@ pub enum Method {
     Online,
 }
 
-/// Estimates of b in N s/m² by seed; none where the online algorithm did not find the exit.
+/// Estimates of b in N s/m² by seed; `None` if the online algorithm did not find the exit.
 #[must_use]
 pub fn estimates(view: &View<'_>, phantom: usize, motion: usize, method: Method) -> Vec<Option<f64>> {
     let case = PHANTOMS[phantom].cases[motion];

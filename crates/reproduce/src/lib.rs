@@ -5,7 +5,7 @@
 //!   [`detection_tuning`]: its detection, tuned within the published range; [`assumed_value_changes`]: values that the paper does not
 //!   give, halved and doubled.
 //! - [`all_runs`]: all runs over all noise seeds, once; [`study_conditions`]: the conditions under which they are evaluated.
-//! - [`claim_protocol`]: what was written down for each claim before the numbers; [`claims`]: one file per claim; [`effect_size`],
+//! - [`claim_protocol`]: the protocol of each claim, written before the runs; [`claims`]: one file per claim; [`effect_size`],
 //!   [`seed_interval`] and [`claim_verdict`]: from numbers to a verdict.
 //! - [`value_source`]: the source of each number; [`assumed_values`]: verdicts that depend on assumed values; [`algorithm_switches`]:
 //!   what each switch of the algorithm does.
@@ -47,13 +47,13 @@ pub struct Reproduction {
     pub claims: Vec<Claim>,
     /// The same as JSON.
     pub claims_json: String,
-    /// What the algorithm's switches do, as JSON.
+    /// The effect of the algorithm's switches, as JSON.
     pub switches_json: String,
     /// Pictures: file name and SVG.
     pub pictures: Vec<(&'static str, String)>,
 }
 
-/// Everything that claims, figures and tables look up, over the noise seeds from `first_seed` on.
+/// All runs needed by claims, figures and tables, over the noise seeds from `first_seed` on.
 #[must_use]
 pub fn plan(first_seed: u64, seeds: u64) -> Plan {
     let asking = Study::asking(first_seed, seeds);
@@ -64,8 +64,8 @@ pub fn plan(first_seed: u64, seeds: u64) -> Plan {
     asking.plan()
 }
 
-/// Runs a plan, judges the claims, draws the figures. `done` is called once for each of
-/// [`Plan::recordings_in_all`]. The same bytes for any number of threads.
+/// Runs a plan, evaluates the claims, draws the figures. `done` is called once for each of [`Plan::recordings_in_all`]. The output
+/// does not depend on the number of threads.
 ///
 /// # Errors
 /// [`ReproduceError`] when a shipped scenario is wrong.

@@ -1,9 +1,9 @@
-//! The paper's experiments: which shipped scenario stands for which.
+//! The paper's experiments and their shipped scenarios.
 
 use stylet_scenario::{ArmFriction, InputError, Robot, Scenario};
 use stylet_tissue::{AnyEffect, NonlinearElasticity};
 
-/// An experiment of the paper, or one that we add to see what a claim depends on.
+/// An experiment of the paper, or one added to test what a claim depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Case {
     /// Isinglass 25 %, constant velocity (supplement Fig. 3).
@@ -103,7 +103,7 @@ impl Case {
         matches!(self, Case::Abdomen | Case::AbdomenArm | Case::AbdomenArmFriction)
     }
 
-    /// Name of the scenario file that it starts from, and its text.
+    /// Name and text of its scenario file.
     #[must_use]
     pub const fn file(self) -> (&'static str, &'static str) {
         match self {
@@ -144,8 +144,8 @@ impl Case {
         }
     }
 
-    /// Whether the arm carries the needle: every seed is then a simulation of its own, because the
-    /// noise of the joint torques moves the arm.
+    /// Whether the arm carries the needle: every seed is then a separate simulation, because the noise of the joint torques
+    /// moves the arm.
     #[must_use]
     pub const fn on_arm(self) -> bool {
         matches!(self, Case::LiverArm | Case::AbdomenArm | Case::LiverArmFriction | Case::AbdomenArmFriction)

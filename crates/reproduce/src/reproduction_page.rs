@@ -1,4 +1,4 @@
-//! The page: claims first, then the numbers of ours, the figures in the supplement's order, switches, the truth.
+//! The page: claims, assumed values, figures in the supplement's order, switches, estimates against the truth.
 
 use crate::all_runs::Study;
 use crate::assumed_values;

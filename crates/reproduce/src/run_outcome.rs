@@ -112,7 +112,7 @@ impl Outcome {
         self.score.missed == 0 && self.score.false_alarms == 0
     }
 
-    /// Friction of a layer in N s/m² as the online algorithm found it.
+    /// Friction of a layer in N s/m² estimated by the online algorithm.
     #[must_use]
     pub fn online_friction(&self, layer: usize) -> Option<f64> {
         self.score.layers.get(layer).and_then(|l| l.friction_ns_per_m2.estimated)
@@ -120,7 +120,7 @@ impl Outcome {
 }
 
 impl Insertion {
-    /// Runs the algorithm and keeps the quantities that the claims use.
+    /// Runs the algorithm and accumulates the quantities that the claims use.
     #[must_use]
     pub fn run(&self, samples: &[Sample], sensor: Sensor, variant: Variant, tuning: &Tuning) -> Outcome {
         Outcome::of(self, samples, &variant.config(&self.scenario, sensor, tuning))

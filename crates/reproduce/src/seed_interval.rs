@@ -1,4 +1,4 @@
-//! A number over the noise seeds with its 95 % interval: seeds are the units.
+//! Mean of a quantity over the noise seeds with its 95 % interval; seeds are the sampling units.
 
 pub use stylet_stats::Interval;
 use stylet_stats::{mean_interval, wilson_at};
@@ -24,7 +24,7 @@ pub fn geometric_mean(values: &[f64]) -> Option<Interval> {
     Some(Interval { value: libm::exp(i.value), low: libm::exp(i.low), high: libm::exp(i.high) })
 }
 
-/// Share with its Wilson interval; a seed may count in part, when it holds several experiments.
+/// Share with its Wilson interval; a seed with several experiments may count in part.
 #[must_use]
 pub fn share(values: &[f64]) -> Option<Interval> {
     if values.is_empty() {

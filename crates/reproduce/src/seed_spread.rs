@@ -1,4 +1,4 @@
-//! A number with its spread over the noise seeds.
+//! Spread of a quantity over the noise seeds.
 
 use serde::Serialize;
 
@@ -36,7 +36,7 @@ impl Spread {
             p5: at(0.05),
             p95: at(0.95),
             mean: stylet_stats::mean(&sorted),
-            // Of one seed there is no spread to speak of; zero keeps the tables readable.
+            // One seed has no spread; zero keeps the tables readable.
             sd: if sorted.len() > 1 { stylet_stats::sd(&sorted) } else { 0.0 },
             n: sorted.len(),
             of: all.len(),

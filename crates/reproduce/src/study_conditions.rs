@@ -1,4 +1,4 @@
-//! The conditions under which a claim looks at the study.
+//! Conditions under which a claim evaluates the study.
 
 use crate::algorithm_variant::{Ablation, Sensor, Setup, Variant};
 use crate::all_runs::{Key, NOISE_MN, Recorded, Study};
@@ -6,14 +6,14 @@ use crate::assumed_value_changes::{Change, Number};
 use crate::paper_experiments::Case;
 use crate::run_outcome::{Offline, Outcome};
 
-/// Seeds on which a halved or doubled number is tried,
+/// Number of seeds for a halved or doubled assumed value,
 pub const CHANGED_SEEDS: u64 = 12;
-/// the same where the arm takes part,
+/// the same for experiments on the arm,
 pub const CHANGED_SEEDS_ARM: u64 = 2;
-/// and seeds of sensitivity conditions that need an arm of their own.
+/// and for sensitivity conditions that need separate simulations of the arm.
 pub const SENSITIVITY_SEEDS_ARM: u64 = 4;
 
-/// The study under one condition: what was changed, the noise, what the algorithm knows in advance, how many seeds.
+/// The study under one condition: changed value, noise, prior knowledge of the algorithm, number of seeds.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
     /// The study.
@@ -22,7 +22,7 @@ pub struct View<'a> {
     pub change: Option<Change>,
     /// Noise of the force/torque sensor in mN.
     pub noise_mn: u32,
-    /// What the algorithm knows in advance.
+    /// Prior knowledge of the algorithm.
     pub setup: Setup,
     /// Seeds.
     pub seeds: u64,

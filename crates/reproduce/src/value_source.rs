@@ -1,4 +1,4 @@
-//! Where a number comes from: every number on the page has its class.
+//! Source class of each number on the page.
 
 use crate::all_runs::NOISE_MN;
 use crate::assumed_value_changes::Number;
@@ -6,23 +6,23 @@ use crate::paper_experiments::Case;
 use stylet_report::{Cell, Table, significant};
 use stylet_scenario::{Motion, Scenario};
 
-/// Where a number comes from.
+/// Source of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Class {
     /// Printed in the paper's supplement.
     Paper,
     /// Published with the authors' laboratory software (facts only).
     Laboratory,
-    /// Measured by others, second hand from literature notes.
+    /// Measured by others, taken from secondary literature.
     Literature,
     /// Chosen here.
     Ours,
-    /// Printed by this program from runs.
+    /// Computed by this program from runs.
     Computed,
 }
 
 impl Class {
-    /// As it stands on the page.
+    /// Label on the page.
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
@@ -35,7 +35,7 @@ impl Class {
     }
 }
 
-/// A table with the class of its numbers: where they differ, a column says it row by row.
+/// A table with the source class of its numbers, in a separate column if it differs by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sourced {
     classes: &'static [Class],
@@ -67,18 +67,18 @@ impl Sourced {
     }
 }
 
-/// A number that goes into an experiment.
+/// An input value of an experiment.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Input {
-    /// What it is.
+    /// Name.
     pub name: String,
-    /// With unit.
+    /// Value with unit.
     pub value: String,
-    /// Where it comes from.
+    /// Source.
     pub class: Class,
     /// Reference or reason.
     pub why: &'static str,
-    /// The name under which it is halved and doubled, if it is.
+    /// Name of its halved and doubled variants, if there are any.
     pub number: Option<Number>,
 }
 
@@ -142,7 +142,7 @@ const fn numbers(case: Case) -> [Option<Number>; 4] {
     }
 }
 
-/// Every number that goes into an experiment, with the value that the scenario holds.
+/// All input values of an experiment, as in its scenario.
 #[must_use]
 pub fn inputs(case: Case, scenario: &Scenario) -> Vec<Input> {
     let mut all = Vec::new();
@@ -232,7 +232,7 @@ pub fn table(case: Case, scenario: &Scenario) -> Sourced {
     })
 }
 
-/// The inputs of several experiments in one table: what they share stands once.
+/// The inputs of several experiments in one table, without repeating common values.
 #[must_use]
 pub fn table_of(cases: &[Case]) -> Sourced {
     let mut all: Vec<(Input, Vec<&str>)> = Vec::new();

@@ -16,7 +16,7 @@ pub fn load_effects(file: &Path) -> Result<Vec<AnyEffect>, InputError> {
 }
 
 impl Scenario {
-    /// Adds the effects of a file to the candidates; one that is there already is kept once.
+    /// Adds the effects of a file to the candidates; duplicates are kept once.
     ///
     /// # Errors
     /// [`InputError`] when the file is wrong, or defines a candidate of the same name differently.

@@ -17,8 +17,7 @@ use stylet_tissue::{AnyEffect, Tissue};
 
 /// Surface position and settings of the online algorithm.
 ///
-/// In a file the fields are flat, `Enhance(surface_m: 0.01, contact: Known, model: MultiLayer)`; a
-/// scenario file serves as well.
+/// In a file the fields are flat, `Enhance(surface_m: 0.01, contact: Known, model: MultiLayer)`; a scenario file is accepted as well.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "Flat", into = "Flat")]
 pub struct EnhancerConfigFile {
@@ -29,7 +28,7 @@ pub struct EnhancerConfigFile {
 }
 
 impl EnhancerConfigFile {
-    /// Loads an `Enhance(...)` file, or takes what it needs from a `Scenario(...)` file.
+    /// Loads an `Enhance(...)` file, or the corresponding fields of a `Scenario(...)` file.
     ///
     /// # Errors
     /// [`InputError`] with file, line and column.
@@ -85,7 +84,7 @@ fn friction_law(tissue: &Tissue, effects: &[AnyEffect]) -> FrictionLaw {
     }
 }
 
-/// Recognised by its name, or by fields of scenarios only.
+/// True if the type name, or a field that only scenarios have, shows a scenario file.
 fn is_scenario(text: &str) -> bool {
     let outline = RonOutline::new(text);
     let named = outline.entries.first().is_some_and(|whole| text[whole.start..].starts_with("Scenario"));

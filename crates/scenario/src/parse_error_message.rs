@@ -163,7 +163,7 @@ impl ErrorLocation<'_> {
 
     /// A value of the wrong type.
     fn wrong(&self, expected: &str) -> (usize, usize, String) {
-        // The parser may still stand on the blank before the value.
+        // The parser may still be at the blank before the value.
         let on = |at: usize| self.outline.enclosing_entry(at).filter(|e| !e.path.is_empty() && e.start <= at);
         match on(self.start).or_else(|| on(self.end)) {
             Some(entry) => {

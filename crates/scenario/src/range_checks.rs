@@ -18,7 +18,7 @@ pub(crate) fn shown(value: f64) -> String {
     if size != 0.0 && !(1e-6..1e9).contains(&size) { format!("{value:e}") } else { value.to_string() }
 }
 
-/// Not negative and at most `most`, beyond which it is a wrong unit or a slip.
+/// Checks that a value is not negative and at most `most`; larger values are wrong units or typing errors.
 pub(crate) fn plausible(path: impl Into<String>, value: f64, most: f64, unit: &str) -> CheckResult {
     let right = format!("it must be zero or a positive number of {unit}, at most {most:e}");
     check(path, value, (0.0..=most).contains(&value), &right)

@@ -1,4 +1,5 @@
-//! Public names that changed in 0.2. Files and command lines with an old name are refused with an error that gives the new one.
+//! Public names that changed in 0.2. Files and command lines with an old name are rejected with an error that gives the new
+//! one.
 
 /// Fields and effects in RON files.
 const RON_NAMES: &[(&str, &str)] = &[

@@ -53,7 +53,7 @@ impl Frame {
                 let name = &text[start..end];
                 if self.path.is_empty() { name.to_owned() } else { format!("{}.{name}", self.path) }
             }
-            // The content of `Some(...)` and of a variant with one value goes by the same path.
+            // The content of `Some(...)` and of a variant with one value has the same path.
             None if self.bracket.is_none() || (self.named && self.index == 0) => self.path.clone(),
             None => format!("{}[{}]", self.path, self.index),
         }

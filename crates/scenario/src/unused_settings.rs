@@ -22,7 +22,7 @@ pub fn unused_settings(enhance: &EnhanceConfig) -> Vec<&'static str> {
     note("prior_friction", enhance.prior_friction != default.prior_friction);
     note("cusum", enhance.cusum != default.cusum);
     note("derivative", enhance.derivative != default.derivative);
-    // Of these a part is common to both.
+    // Some of these settings are used by both algorithms.
     let mut drop = enhance.drop;
     drop.standstill_mps = default.drop.standstill_mps;
     note("drop", drop != default.drop);

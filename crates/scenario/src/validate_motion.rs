@@ -5,13 +5,13 @@ use crate::motion::{Motion, Segment};
 use crate::range_checks::{CheckResult, check, finite, positive, shown};
 use crate::scenario::Scenario;
 
-/// Larger numbers of samples or physics steps are refused as typing errors.
+/// Larger numbers of samples or physics steps are rejected as typing errors.
 const MAX_SAMPLES: f64 = 5e7;
 const MAX_PHYSICS_STEPS: f64 = 1e9;
 /// Steps shorter than 10 us do not improve the simulation.
 const MAX_PHYSICS_HZ: f64 = 1e5;
 
-/// Larger speeds are taken for mm/s.
+/// Larger speeds are assumed to be in mm/s and rejected.
 const MAX_SPEED_MPS: f64 = 1.0;
 
 pub(crate) fn motion(s: &Scenario) -> CheckResult {

@@ -1,22 +1,22 @@
-//! How a recording begins: which baseline the force follows before contact, where contact is, and whether there is any air at all.
+//! Beginning of a recording: form of the force baseline in air, position of the contact, and whether the recording begins in air at all.
 //!
-//! The online core ([`stylet_core`]) follows the baseline and finds the contact. Whether there was any air is decided over the whole
-//! recording: a second core starts in the tissue, and the start that predicts the next samples better holds.
+//! The online core ([`stylet_core`]) estimates the baseline and finds the contact. Whether there was any air is decided over the whole
+//! recording: a second core starts in the tissue, and the start with the better one-step prediction is chosen.
 
 use serde::Serialize;
 use stylet_core::config::{Algorithm, Contact};
 use stylet_core::{Baseline, BaselineKind, EnhanceConfig, Enhancer, Output, Sample, Units, ZeroStep};
 
-/// Log odds in nats at which the recording begins in the tissue, from the errors of prediction of both starts: these are correlated,
-/// and a start in air is usual.
+/// Log odds in nats, from the prediction errors of both starts, above which the recording begins in the tissue; high because the errors
+/// are correlated and most recordings start in air.
 const MIN_LOADED_NATS: f64 = 30.0;
-/// Errors of prediction closer than this (s) count as one: what a model lacks does not change from sample to sample.
+/// Prediction errors closer than this (s) count as one, because model errors are correlated from sample to sample.
 const INDEPENDENT_S: f64 = 5e-3;
-/// Used samples before which the baseline in air is not known.
+/// Used samples from which the baseline in air is known.
 const BASELINE_SAMPLES: f64 = 100.0;
-/// Most by which learning a moving baseline on the way raises the variance in air.
+/// Largest factor by which learning a moving baseline raises the variance in air.
 const LEARNING_FACTOR: f64 = 1.2;
-/// Travel below this (m) is no motion.
+/// Travel below this (m) counts as no motion.
 const MIN_TRAVEL_M: f64 = 1e-9;
 
 /// Hypothesis about the beginning of a recording.
@@ -66,8 +66,7 @@ pub struct ContactFinding {
     pub setting: &'static str,
     /// The hypothesis.
     pub hypothesis: ContactHypothesis,
-    /// Probability of the contact against a baseline or a step of the zero without one, 0 to 1; absent where the contact is
-    /// given.
+    /// Probability that the load is a contact, not a moving baseline or a step of the zero, 0 to 1; absent if the contact is configured.
     pub probability: Option<f64>,
     /// Position of the contact in m.
     pub contact_m: Option<f64>,
@@ -133,19 +132,19 @@ impl ContactFinding {
         format!("{place}, after {before} ({setting})")
     }
 
-    /// The contact was to be detected, and the recording begins loaded.
+    /// True if contact detection was requested, but the recording begins loaded.
     #[must_use]
     pub fn is_loaded_unexpectedly(&self) -> bool {
         self.hypothesis == ContactHypothesis::BeginsLoaded && self.setting == Contact::Detected.name()
     }
 
-    /// The finding without a contact and without the baseline and the steps in air that led to one.
+    /// The finding without a contact, baseline and steps in air.
     #[must_use]
     pub fn without_contact(&self) -> Self {
         Self { setting: self.setting, hypothesis: self.hypothesis, ..Self::default() }
     }
 
-    /// The finding is remarkable: anything but a constant offset.
+    /// True for anything but a constant offset.
     #[must_use]
     pub fn is_remarkable(&self) -> bool {
         self.hypothesis != ContactHypothesis::ConstantOffset || !self.zero_steps.is_empty()
@@ -182,18 +181,18 @@ impl Errors {
         self.loaded_n2 += share * (loaded_n * loaded_n - self.loaded_n2);
     }
 
-    /// Log odds in nats of a start in the tissue, when the air's errors have this variance.
+    /// Log odds in nats of a start in the tissue, if the errors in air have this variance.
     fn nats(&self, air_n2: f64) -> f64 {
         if self.loaded_n2 > 0.0 { 0.5 * self.independent * libm::log(air_n2 / self.loaded_n2) } else { 0.0 }
     }
 }
 
-/// Collects what a finding needs, sample by sample.
+/// Computes a finding sample by sample.
 #[derive(Clone, Debug, Default)]
 pub struct ContactAssessor {
     /// The core that starts in the tissue, without stored samples.
     loaded: Option<Enhancer<Vec<Sample>>>,
-    /// Errors of prediction behind the contact.
+    /// Prediction errors after the contact.
     behind: Errors,
     /// Deviations from the baseline in air, and errors of the start in the tissue, as long as there is no contact.
     in_air: Errors,
@@ -209,7 +208,7 @@ pub struct ContactAssessor {
 }
 
 impl ContactAssessor {
-    /// For a core with this configuration and surface.
+    /// Creates an assessor for a core with this configuration and surface.
     #[must_use]
     pub fn new(config: &EnhanceConfig, surface_m: f64, units: Units) -> Self {
         let detected = config.contact == Contact::Detected && config.active_algorithm() == Algorithm::Stylet;
@@ -220,7 +219,7 @@ impl ContactAssessor {
         Self { loaded: detected.then(start), ..Self::default() }
     }
 
-    /// Takes a sample and its output.
+    /// Adds a sample and its output.
     pub fn push(&mut self, sample: &Sample, out: &Output) {
         self.zero_steps.extend(out.zero_step);
         if out.contact_m.is_none() || self.last.is_none_or(|(contact, ..)| contact.is_none()) {
@@ -285,8 +284,8 @@ impl ContactAssessor {
         }
     }
 
-    /// Log odds in nats of a start in the tissue: from what is behind the contact, or without one from the deviations from the
-    /// baseline that the one before does not predict.
+    /// Log odds in nats of a start in the tissue: from the errors after the contact or, without a contact, from the whitened deviations
+    /// from the baseline.
     fn loaded_nats(&self) -> f64 {
         if self.behind.count > 0.0 {
             return self.behind.nats(self.behind.air_n2);

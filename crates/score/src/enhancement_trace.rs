@@ -158,7 +158,7 @@ impl Trace {
             self.first_estimate = self.estimates.len();
         }
         if let Some(step) = out.zero_step {
-            // A step of the zero that was declared as a rupture at first.
+            // A step of the zero that was first declared as a rupture.
             if let Some(layer) = step.withdrawn {
                 self.detections.retain(|d| d.layer != layer);
                 self.estimates.retain(|e| e.layer != layer);
@@ -179,7 +179,7 @@ impl Trace {
     }
 
     /// Offline estimate of the layer in the span `(start_m, end_m, until_s)`, given the cumulative friction of the previous layers.
-    /// The elastic share of the online estimate decides the split where the data do not.
+    /// The elastic share of the online estimate determines the split where the data do not.
     fn offline(
         recording: &Recording,
         force_n: &[f64],
@@ -210,7 +210,7 @@ impl Trace {
     }
 }
 
-/// Units that fit the recording.
+/// Internal units for the scale of the recording.
 fn units_of(recording: &Recording, force_n: &[f64]) -> Units {
     let mut scale = RecordingScale::default();
     for (z, f) in recording.position_m.iter().zip(force_n) {

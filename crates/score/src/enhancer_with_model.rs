@@ -51,7 +51,7 @@ pub struct RecordingScale {
 }
 
 impl RecordingScale {
-    /// Takes a sample; values that are not finite do not count.
+    /// Adds a sample; values that are not finite are ignored.
     pub fn push(&mut self, position_m: f64, force_n: f64) {
         if !(position_m.is_finite() && force_n.is_finite()) {
             return;
@@ -64,7 +64,7 @@ impl RecordingScale {
         self.span_m = [self.span_m[0].min(position_m), self.span_m[1].max(position_m)];
     }
 
-    /// Units that fit.
+    /// Internal units for this scale.
     #[must_use]
     pub fn units(&self) -> Units {
         Units::for_extent(self.span_m[1] - self.span_m[0], self.change_n)
@@ -73,9 +73,9 @@ impl RecordingScale {
 
 /// An online core, and optionally a model that gives the shaft friction.
 ///
-/// The model maps a sample and the number of ruptures that the core has declared so far to the friction in N. Ruptures come
-/// from the core, not from the model: their places differ by millimetres between insertions, the friction behind begins
-/// there, and the core detects them within samples.
+/// The model maps a sample and the number of ruptures that the core has declared so far to the friction in N. Ruptures come from
+/// the core, not from the model: their positions differ by millimetres between insertions, friction changes there, and the core
+/// detects them within samples.
 ///
 /// In retraction nothing pushes on the tip, so the enhanced force should be zero. As long as the model leaves a larger mean square
 /// there than the core's own friction, the core's own friction is used.

@@ -14,7 +14,7 @@ pub const MIN_FORCE_SHARE: f64 = 0.01;
 pub struct FoundLayer {
     /// Position of its front in m.
     pub front_m: f64,
-    /// Thickness in m; of the last one, what the needle reached.
+    /// Thickness in m; for the last one, the depth that the needle reached in it.
     pub thickness_m: f64,
     /// Stiffness in N/m.
     pub stiffness_n_per_m: f64,
@@ -40,8 +40,8 @@ impl FoundLayer {
 
 /// The layers from the contact to the deepest position, in order. `None` without a contact.
 ///
-/// A layer ends at its rupture, or where the next one begins if that is further on: the tip was free between them. A last one in which no
-/// elastic force acts is the space behind the tissue, and left out.
+/// A layer ends at its rupture, or where the next one begins if that is further on: the tip was free between them. A last one without
+/// elastic force is the space behind the tissue and is left out.
 #[must_use]
 pub fn found_layers(trace: &Trace, recording: &Recording) -> Option<Vec<FoundLayer>> {
     let position_m = &recording.position_m;

@@ -1,6 +1,6 @@
 //! Scores of the online core on a measured recording without ground truth: its detections against the drops of the raw force,
-//! and the enhanced force during retraction, where nothing acts at the tip. What the core keeps of a pull that is added to
-//! the recording guards against an output of zero.
+//! and the enhanced force during retraction, where nothing acts at the tip. A pull added to the recording, and the share of it
+//! in the output, reveals an enhancement that is always zero.
 
 use crate::enhancement_trace::Trace;
 use crate::rupture_matching::{MATCH_EARLIEST_S, MATCH_LATEST_S};
@@ -16,7 +16,7 @@ const PULSE_M: f64 = 2e-3;
 /// Retraction at which it begins, in m: while the shaft is stretched, and while it slides.
 const PULL_PLACES_M: [f64; 3] = [4e-3, 7e-3, 12e-3];
 
-/// A measured recording and what is known of it without the core.
+/// A measured recording with reference events from the raw data.
 pub struct MeasuredRecording<'a> {
     /// Name.
     pub name: &'a str,
@@ -57,15 +57,15 @@ pub struct MeasuredScore {
     pub found: usize,
     /// Detections without a drop during insertion.
     pub false_insertion: usize,
-    /// In the hold.
+    /// Detections in the hold.
     pub false_hold: usize,
-    /// During retraction.
+    /// Detections during retraction.
     pub false_retraction: usize,
     /// Force during retraction in the tissue (N rms): friction, because nothing pushes the tip.
     pub retraction_raw_n: f64,
     /// Enhanced force of the core there (N rms).
     pub retraction_enhanced_n: f64,
-    /// Force less the replayed friction of a model fitted to the other recordings, with the ruptures of the core (N rms).
+    /// Force minus the replayed friction of a model fitted to the other recordings, with the ruptures of the core (N rms).
     pub retraction_model_n: f64,
     /// The core with that model.
     pub with_model: Option<ModelFrictionScore>,
@@ -142,10 +142,10 @@ pub struct ModelFrictionScore {
     pub residual_rms_n: f64,
     /// Largest enhanced force in N.
     pub residual_max_n: f64,
-    /// Fraction of its peak that an added pull of 0.5 N over 2 mm keeps: median over three places, NaN where the retraction is
-    /// too short.
+    /// Peak of the enhanced force due to an added pull of 0.5 N over 2 mm, relative to the pull: median over three positions,
+    /// NaN if the retraction is too short.
     pub pulse_kept: f64,
-    /// Fraction of its size that an added step keeps after 1 mm, likewise.
+    /// The same for an added step, 1 mm after it.
     pub step_kept: f64,
 }
 

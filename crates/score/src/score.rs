@@ -71,7 +71,7 @@ pub struct Score {
     pub false_alarms: usize,
     /// Times of the false detections in s.
     pub false_s: Vec<f64>,
-    /// More than one false detection per true rupture: matches are chance.
+    /// More than one false detection per true rupture: matches may be by chance.
     pub hits_are_chance: bool,
     /// Every ruptured layer.
     pub layers: Vec<LayerScore>,

@@ -65,7 +65,7 @@ impl Ar {
         ar
     }
 
-    /// From the autocovariances at lags `0..=p` (Levinson and Durbin): the model with exactly these.
+    /// From the autocovariances at lags `0..=p` (Levinson and Durbin); the model has exactly these.
     #[must_use]
     pub fn from_autocovariance(lags: &[f64]) -> Self {
         let variance = lags.first().copied().unwrap_or(0.0);
@@ -183,8 +183,8 @@ impl Ar {
         }
     }
 
-    /// Whitens one segment: `out` has mean zero, unit variance, no correlation where `e` is of this model. Linear in `e`, so
-    /// that the same call whitens the columns of a sensitivity. Of slices of different length the rest of the longer one is not used.
+    /// Whitens one segment: `out` has mean zero, unit variance, no correlation where `e` is of this model. Linear in `e`, so that the
+    /// same call whitens the columns of a sensitivity. If the slices differ in length, the rest of the longer one is not used.
     pub fn whiten(&self, e: &[f64], out: &mut [f64]) {
         let n = e.len().min(out.len());
         let start = self.order.min(n);

@@ -20,7 +20,7 @@ pub fn plus_minus(value: f64, half_width: Option<f64>, digits: usize) -> String 
     half_width.map_or_else(|| value.clone(), |d| format!("{value} ± {}", significant(d, 2)))
 }
 
-/// A p-value: `p = 0.012`. Below 1e-12 the tail of the noise distribution is not known: `p < 1e-12`.
+/// A p-value: `p = 0.012`. Below 1e-12, where the tail of the noise distribution is not known, `p < 1e-12`.
 #[must_use]
 pub fn p_value(p: f64) -> String {
     if p < 1e-12 { "p < 1e-12".to_owned() } else { format!("p = {}", significant(p, 2)) }

@@ -73,7 +73,7 @@ pub fn mad_scale(residuals: &mut [f64]) -> f64 {
     median(residuals) * MAD_TO_SD
 }
 
-/// Standard deviation of a normal distribution whose median absolute value is one: `1 / normal::quantile(0.75)`.
+/// Standard deviation of a centred normal distribution with median absolute value one: `1 / normal::quantile(0.75)`.
 pub const MAD_TO_SD: f64 = 1.482_602_218_505_602;
 
 /// Smallest and largest value, `NaN` left out; `(NaN, NaN)` without values.

@@ -1,9 +1,9 @@
 //! Parallel maps over slices, vectors and ranges, in order.
 //!
 //! The methods have the names of rayon's and run on its current thread pool. Each step is a whole parallel map whose loop is
-//! compiled once for all types, where rayon compiles its scheduler again for every chain of adapters: that took a quarter of the
-//! build time of the diagnosis. Meant for tasks of microseconds and more; results keep the order of the items, so that they do not
-//! depend on the number of threads.
+//! compiled once for all types; rayon compiles its scheduler for every chain of adapters, which took a quarter of the build time
+//! of the diagnosis. Meant for tasks of microseconds and more; results keep the order of the items, so that they do not depend on
+//! the number of threads.
 //!
 //! ```
 //! use stylet_stats::parallel::*;

@@ -10,7 +10,7 @@ const BITS: u32 = 18;
 /// The quantiles at each of `qs` (0 to 1), bit for bit those of [`crate::quantile`]. `NaN` without values.
 ///
 /// `pass` calls its argument with every value; it is called one to five times and must give the same values every time.
-/// Takes some ten megabytes of memory, whatever the value_of of values.
+/// Takes some ten megabytes of memory for any number of values.
 ///
 /// # Errors
 /// The error of `pass`.
@@ -87,7 +87,7 @@ impl Histogram {
     }
 }
 
-/// Keys with the same leading bits, which contain ranks that are sought.
+/// Keys with the same leading bits that contain the ranks sought.
 struct Range {
     first: u64,
     known: u32,

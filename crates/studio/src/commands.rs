@@ -1,10 +1,10 @@
-//! The command line and the Python lines that repeat what the page did.
+//! The command line and the Python lines that reproduce the actions of the page.
 
 use crate::messages::CommandView;
 use std::path::{Path, PathBuf};
 use stylet_api::{DiagnosisInputs, OutputFiles};
 
-/// A word for the shell.
+/// Quotes a word for the shell.
 fn word(text: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,@%+".contains(c);
     if !text.is_empty() && text.chars().all(plain) {
@@ -25,7 +25,7 @@ fn shell(name: &str, options: &[(&str, &[&Path])]) -> String {
     line
 }
 
-/// A text for Python.
+/// A Python string literal.
 fn text(of: &Path) -> String {
     format!("{:?}", of.display().to_string())
 }

@@ -1,4 +1,4 @@
-//! The messages: name and JSON body of a request to the JSON of the answer.
+//! Dispatch of messages: from name and JSON body of a request to the JSON of the answer.
 
 use crate::messages::*;
 use crate::phantom_view::view;
@@ -59,7 +59,7 @@ impl Studio {
         open::adopt_proposal(self, &name)?;
         let found = open::inspect(self, &name);
         if found.is_err() {
-            // Nothing that the page could show.
+            // No data for the page.
             self.workspace.remove(&name)?;
         }
         json(found?)

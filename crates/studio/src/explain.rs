@@ -1,4 +1,4 @@
-//! Diagnosis, plan and prediction, each in a thread of its own.
+//! Diagnosis, plan and prediction, each in a separate thread.
 
 use crate::commands;
 use crate::messages::*;
@@ -39,7 +39,7 @@ fn inputs(studio: &mut Studio, files: &[String]) -> Result<DiagnosisInputs, Prob
     })
 }
 
-/// Starts a job; what the page shows of it.
+/// Starts a job; returns its state for the page.
 fn launch(
     studio: &mut Studio,
     kind: &'static str,
@@ -51,10 +51,10 @@ fn launch(
     Ok(view)
 }
 
-/// Takes the result of a job into the state.
+/// Stores the result of a job in the state.
 pub fn collect(studio: &mut Studio, (command, update): JobResult) {
     update(&mut studio.explained);
-    // The results are complete; a journal that cannot be written fails the next change, too.
+    // The results are complete; an unwritable journal is reported at the next change.
     let _ = studio.workspace.record(command);
 }
 
@@ -73,7 +73,7 @@ pub fn start_diagnosis(studio: &mut Studio, request: FilesRequest) -> Result<Val
         stage("writing the results");
         output.write(&folder)?;
         let diagnosed = Diagnosed::new(&found.diagnosis, found.extended);
-        // Plan and prediction were those of the diagnosis before.
+        // Plan and prediction belong to the previous diagnosis.
         let update =
             |now: &mut Explained| *now = Explained { diagnosis: Some(diagnosed), ..Explained::default() };
         Ok((commands::diagnose(&inputs, &folder, &output), Box::new(update)))

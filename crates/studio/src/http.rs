@@ -1,5 +1,5 @@
-//! A small HTTP server for pages of this program: a router on a thread of its own, bounded in connections, sizes and waiting times, and the
-//! check of `Host`, `Origin` and token that keeps foreign web pages out.
+//! A small HTTP server for pages of this program: a router on a separate thread, bounded in connections, sizes and waiting times, which
+//! checks `Host`, `Origin` and token to reject requests of foreign web pages.
 
 use axum::body::Body;
 use axum::extract::{Request, State};
@@ -23,20 +23,20 @@ use tokio::sync::{Notify, Semaphore};
 use tokio::task::AbortHandle;
 use tokio::time::{sleep, timeout};
 
-/// Time in which a client must send the head of its request.
+/// Timeout for the head of a request.
 const HEAD_TIMEOUT: Duration = Duration::from_secs(2);
 /// Time for the last request of a connection at the end of its lifetime.
 const LAST_REQUEST_TIMEOUT: Duration = Duration::from_secs(60);
 /// Pause after a connection that cannot be accepted, as when all file handles are in use.
 const RETRY_INTERVAL: Duration = Duration::from_millis(20);
-/// Longest time for refusing a connection.
+/// Timeout for rejecting a connection.
 const REFUSAL_TIMEOUT: Duration = Duration::from_millis(100);
 const REFUSAL: &[u8] =
     b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 5\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
-/// Threads for work that takes longer than a moment.
+/// Threads for blocking work.
 const WORKERS: usize = 4;
 
-/// What a page may load unless its handler allows more: its own files, and results in frames.
+/// Default content security policy: a page may load its own files, and results in frames.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self'; frame-src 'self'; \
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
@@ -44,20 +44,20 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; i
 pub struct Limits {
     /// Connections at the same time.
     pub connections: usize,
-    /// Counts further connections, which are answered with 503; without it they wait in the system's queue.
+    /// Counter of further connections, which are answered with 503; without a counter they wait in the system's queue.
     pub refused: Option<Arc<AtomicU64>>,
     /// Bytes of a connection in memory, and so of the head of a request.
     pub buffer_bytes: usize,
-    /// Lifetime of a connection; then it ends after the request in progress.
+    /// Lifetime of a connection, after which it ends with the request in progress.
     pub lifetime: Duration,
 }
 
-/// Ends the connection of a request, which it is an extension of.
+/// Request extension that ends the connection.
 pub type Closing = Arc<OnceLock<AbortHandle>>;
 
-/// Who may send requests.
+/// Access rules for requests.
 pub struct Access {
-    /// Whether this host, with its port, is the server itself.
+    /// Whether a `Host` value, with its port, is this server.
     pub own_host: Box<dyn Fn(&str) -> bool + Send + Sync>,
     /// First part of every path, if there is a token.
     pub token: Option<String>,
@@ -104,7 +104,7 @@ impl Drop for HttpServer {
     fn drop(&mut self) {
         self.stop.notify_one();
         if let Some(thread) = self.thread.take() {
-            // A thread that panicked has reported it.
+            // A panic of the thread was already reported.
             let _ = thread.join();
         }
     }
@@ -116,7 +116,7 @@ async fn accept(listener: tokio::net::TcpListener, router: Router, limits: Limit
     http.timer(TokioTimer::new())
         .header_read_timeout(HEAD_TIMEOUT)
         .max_buf_size(limits.buffer_bytes)
-        // Where connections are refused, none may stay open without a request.
+        // If connections are rejected, idle ones must be closed.
         .keep_alive(limits.refused.is_none());
     loop {
         if limits.refused.is_none() {
@@ -155,7 +155,7 @@ async fn refuse(stream: TcpStream) -> io::Result<()> {
     stream.try_write(REFUSAL).map(drop)
 }
 
-/// Refuses what does not come from the page itself, and adds the headers of every answer.
+/// Rejects requests that do not come from the page itself, and adds headers to every answer.
 async fn guard(State(access): State<Arc<Access>>, request: Request, next: Next) -> Response {
     let mut response = match refusal(&access, request.headers(), request.uri()) {
         Some((status, why)) => plain(status, why),
@@ -197,7 +197,7 @@ fn refusal(access: &Access, headers: &HeaderMap, uri: &Uri) -> Option<(StatusCod
     }
 }
 
-/// Comparison whose duration does not depend on where the texts differ.
+/// Constant-time comparison.
 fn equal_in_constant_time(a: &[u8], b: &[u8]) -> bool {
     a.len() == b.len() && a.iter().zip(b).fold(0, |all, (x, y)| all | (x ^ y)) == 0
 }

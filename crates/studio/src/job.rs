@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-/// What a thread has done so far.
+/// Progress of a thread.
 struct Progress<T> {
     stages: Vec<String>,
     result: Option<Result<T, Problem>>,
@@ -28,7 +28,7 @@ pub struct Work<T> {
 }
 
 impl<T: Send + 'static> Work<T> {
-    /// Starts work; it calls the function that it is given with the name of each stage.
+    /// Starts work, which reports the name of each stage through the given function.
     ///
     /// # Errors
     /// When no thread can be started.
@@ -42,7 +42,7 @@ impl<T: Send + 'static> Work<T> {
         let run = move || {
             let stage = |name: &str| {
                 if stop.load(Ordering::Relaxed) {
-                    // Unwinds without the message of a panic.
+                    // Unwinds without printing a panic message.
                     resume_unwind(Box::new(Cancelled));
                 }
                 shared.lock().unwrap_or_else(PoisonError::into_inner).stages.push(name.to_owned());

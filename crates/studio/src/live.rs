@@ -1,6 +1,6 @@
 //! The page of `stylet listen`: the live curves and their event stream.
 //!
-//! A reader that is slow loses lines of its own; one that accepts nothing for long is disconnected. The online algorithm waits for none.
+//! A slow reader loses lines; one that accepts nothing for long is disconnected. The online algorithm never waits for a reader.
 
 use crate::http::{Access, Closing, HttpServer, Limits, respond, with_policy};
 use axum::body::{Body, Bytes};
@@ -24,9 +24,9 @@ use tokio::time::{sleep, timeout};
 const MAX_READERS: usize = 32;
 /// Longest head of a request in bytes.
 const MAX_HEAD_BYTES: usize = 8192;
-/// Interval between updates: faster than the eye, slow enough for a browser.
+/// Interval between updates: smooth for the eye and slow enough for a browser.
 const UPDATE_INTERVAL: Duration = Duration::from_millis(40);
-/// A browser that accepts nothing for this long is disconnected.
+/// Time without progress after which a browser is disconnected.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(15);
 /// The page is one file with its own script.
 const LIVE_POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; connect-src 'self'; \

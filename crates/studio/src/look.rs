@@ -40,7 +40,7 @@ fn config(algorithm: &str, contact_mm: Option<f64>) -> Result<EnhancerConfigFile
     Ok(config)
 }
 
-/// The outputs of an algorithm for a recording; those shown last are kept.
+/// The outputs of an algorithm for a recording; the last ones are cached.
 pub fn run_algorithm(
     studio: &mut Studio,
     file: &str,
@@ -122,8 +122,8 @@ pub fn look(studio: &mut Studio, request: LookRequest) -> Result<LookView, Probl
     })
 }
 
-/// Ruptures of a run; those that the user has moved are where he says: between contact and the neighbours, at the first passage of the tip.
-/// With each comes whether it was moved.
+/// Ruptures of a run, each with a flag whether the user moved it. A moved rupture is limited by contact and neighbours, and dated at the
+/// first passage of the tip.
 pub fn corrected_ruptures(
     algorithm: &str,
     run: &AlgorithmRun,
@@ -145,7 +145,7 @@ pub fn corrected_ruptures(
     ruptures
 }
 
-/// What the algorithm found with the corrections: a rupture that was moved is the far face of its layer, at which the next one begins.
+/// Layers found by the algorithm, with the corrections: a moved rupture is the far face of its layer, where the next one begins.
 pub fn corrected_trace(
     algorithm: &str,
     run: &AlgorithmRun,
@@ -244,7 +244,7 @@ pub fn write_enhancement(studio: &mut Studio, request: LookRequest) -> Result<Va
         workspace.write(name, format!("Enhance({})\n", settings.join(", ")).as_bytes())?;
     }
     let config_path = config_file.map(|name| workspace.path(&name));
-    // As the command reads it.
+    // As written by the command.
     let (recording, notes) = stylet_record::read_csv(&data, &studio.read_options())?;
     let folder_name = format!("enhanced-{stem}");
     let folder = studio.workspace.path(&folder_name);

@@ -1,6 +1,6 @@
 //! Messages between the page and the studio, JSON on the wire: the requests, and those parts of the answers that several handlers share.
-//! Everything is ready for display: depths are in mm, numbers that are printed come as text, sliders as positions. The page computes
-//! nothing.
+//! Everything is ready for display: depths are in mm, numbers that are printed come as text, sliders as positions. The page does not
+//! compute anything.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -25,7 +25,7 @@ impl<E: std::error::Error> From<E> for Problem {
     }
 }
 
-/// A command that repeats what the page did.
+/// A command that reproduces an action of the page.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CommandView {
     pub shell: String,
@@ -123,10 +123,10 @@ pub struct EditRequest {
     /// Recording along which the force is predicted; without one the phantom's own motion.
     #[serde(default)]
     pub along: Option<String>,
-    /// Movement of the mouse that the edit belongs to: one step of undo.
+    /// Mouse drag that the edit belongs to: one step of undo.
     #[serde(default)]
     pub stroke: Option<u64>,
-    /// Whether the movement goes on, so that nothing needs to be written yet.
+    /// Whether the drag continues, so that nothing is written yet.
     #[serde(default)]
     pub transient: bool,
 }
@@ -182,7 +182,7 @@ pub struct EditView {
     pub redo: usize,
 }
 
-/// What the user knows better than the online algorithm.
+/// Corrections of the online algorithm by the user.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Corrections {

@@ -1,4 +1,4 @@
-//! What is in a file: columns, units, findings of `stylet inspect`; corrections become the column map.
+//! Contents of a file: columns, units, findings of `stylet inspect`; corrections by the user become the column map.
 
 use crate::look::{finding, findings, size_text};
 use crate::messages::*;
@@ -14,13 +14,13 @@ use stylet_record::inspect::{
 };
 use stylet_report::significant;
 
-/// Rows of a file that are looked at for the small plots.
+/// Number of rows sampled for the small plots.
 const SKETCH_ROWS: u64 = 160;
 /// Bytes that are read for one of these rows.
 const ROW_BYTES: u64 = 4096;
 /// Columns that are shown.
 const MAX_COLUMNS: usize = 60;
-/// Relative difference below which a scale is that of a unit.
+/// Relative difference below which a scale matches a unit.
 const SAME_SCALE: f64 = 1e-9;
 
 /// A unit and its size in SI units.
@@ -65,7 +65,7 @@ fn sketches(path: &Path, columns: usize) -> Option<Vec<Vec<f64>>> {
     };
     let mut values = vec![Vec::new(); columns];
     for k in 0..SKETCH_ROWS {
-        // The first line of a piece is cut, or the header.
+        // The first line of a piece is truncated, or is the header.
         let text = piece(k * size / SKETCH_ROWS)?;
         let Some(row) = text.lines().nth(1) else { continue };
         let split = [';', '\t', '|', ',', ' '].map(|d| cells(row, d));
@@ -77,7 +77,7 @@ fn sketches(path: &Path, columns: usize) -> Option<Vec<Vec<f64>>> {
     values.first().is_some_and(|column| column.len() > 1).then_some(values)
 }
 
-/// What is in a file, as the map says.
+/// Contents of a file under the present map.
 pub fn inspect(studio: &mut Studio, file: &str) -> Result<Value, Problem> {
     let path = studio.workspace.data(file)?;
     let options = InspectOptions { columns: studio.now.map.clone() };
@@ -113,7 +113,7 @@ pub fn inspect(studio: &mut Studio, file: &str) -> Result<Value, Problem> {
     }))
 }
 
-/// The column of a map that a column of the file is.
+/// The entry of a map for a column of the file.
 fn is_column(mapped: &Column, candidate: Option<&Candidate>, number: usize, name: &str) -> bool {
     match mapped.is_open() {
         true => candidate.is_some_and(|c| c.columns.contains(&number)),
@@ -170,7 +170,7 @@ pub fn adopt_proposal(studio: &mut Studio, file: &str) -> Result<(), Problem> {
     Ok(())
 }
 
-/// Takes a correction into the map.
+/// Adds a correction to the map.
 pub fn set_column(studio: &mut Studio, request: ColumnRequest) -> Result<Value, Problem> {
     let options = InspectOptions { columns: studio.now.map.clone() };
     let found = inspect_file(studio.workspace.data(&request.file)?, &options);
@@ -184,7 +184,7 @@ pub fn set_column(studio: &mut Studio, request: ColumnRequest) -> Result<Value, 
         let candidate = found.candidates.iter().find(|k| k.role.name() == quantity);
         if quantity == request.quantity {
             let given = units.iter().find(|(unit, _)| *unit == request.unit).map(|(_, size)| *size);
-            // Without a unit that of the file counts.
+            // Without a unit, the unit of the file is used.
             let scale = match request.flipped {
                 true => Some(-given.or(of_file).unwrap_or(1.0)),
                 false => given,
@@ -202,7 +202,7 @@ pub fn set_column(studio: &mut Studio, request: ColumnRequest) -> Result<Value, 
     inspect(studio, &request.file)
 }
 
-/// Takes the sampling rate of a file without usable times into the map.
+/// Adds the sampling rate of a file without usable times to the map.
 pub fn set_rate(studio: &mut Studio, request: RateRequest) -> Result<Value, Problem> {
     let path = studio.workspace.data(&request.file)?;
     let options = InspectOptions { columns: studio.now.map.clone() };
@@ -213,7 +213,7 @@ pub fn set_rate(studio: &mut Studio, request: RateRequest) -> Result<Value, Prob
     inspect(studio, &request.file)
 }
 
-/// Goes back to what is found without a map.
+/// Resets the map to the automatic assignment.
 pub fn forget_map(studio: &mut Studio) -> Result<Value, Problem> {
     studio.change(Snapshot { map: None, ..studio.now.clone() }, true, true)?;
     studio.state()

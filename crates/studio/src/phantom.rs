@@ -1,4 +1,4 @@
-//! The phantom: a scenario that is edited with the mouse.
+//! Edits of the phantom, a scenario that is changed with the mouse.
 
 use crate::look::MIN_THICKNESS_M;
 use crate::messages::*;
@@ -27,7 +27,7 @@ const MOTIONS: [(&str, &str); 3] = [
     ("varied", "advance, hold, varying speed, retraction: shows most effects"),
 ];
 
-/// Lists that never change.
+/// Constant lists.
 pub fn library() -> Value {
     let entry = |e: &EffectInfo| json!({ "id": e.id, "title": title(e.id), "equation": e.equation, "signature": e.signature });
     json!({

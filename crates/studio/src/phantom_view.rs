@@ -1,4 +1,4 @@
-//! A phantom as the page shows it: shipped scenarios, numbers as sliders, texts.
+//! View of a phantom for the page: shipped scenarios, parameters as sliders, texts.
 
 use crate::messages::*;
 use crate::sliders::Scale;

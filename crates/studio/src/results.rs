@@ -18,7 +18,7 @@ pub const EXTENDED: &str = "diagnosis/extended.ron";
 const LIMITS_AT_FIRST: Limits =
     Limits { depth_m: 0.0, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0 };
 
-/// The work of the studio.
+/// A job of the studio.
 pub type Job = Work<JobResult>;
 
 /// A finished diagnosis.
@@ -42,7 +42,7 @@ pub struct Planned {
     pub motion: Motion,
 }
 
-/// What a job gives: the command that repeats it, and the change of the results.
+/// Result of a job: the command that reproduces it, and the change of the results.
 pub type JobResult = (CommandView, Box<dyn FnOnce(&mut Explained) + Send>);
 
 /// The results in the workspace.
@@ -54,7 +54,7 @@ pub struct Explained {
 }
 
 impl Explained {
-    /// The diagnosis that a workspace holds.
+    /// The diagnosis of a workspace.
     pub fn read(workspace: &Workspace) -> Self {
         let read = || {
             let diagnosis = serde_json::from_str(&workspace.read("diagnosis/diagnosis.json")?).ok()?;

@@ -1,8 +1,8 @@
 //! The local server: one page, the messages of [`Studio`], uploads, and the result files of the workspace.
 //!
 //! It listens on the loopback interface only. Every address begins with a random token; `Host` and `Origin` must be the server's own. The
-//! page may load nothing but its own files, and no inline script. Connections, request bodies and waiting times are bounded. Uploads go to
-//! a temporary folder, which is removed at the end.
+//! page may load only its own files, and no inline script. Connections, request bodies and waiting times are bounded. Uploads go to a
+//! temporary folder, which is removed at the end.
 
 use crate::http::{Access, HttpServer, Limits, plain, respond, with_policy};
 use crate::messages::Problem;
@@ -34,7 +34,7 @@ const MAX_MESSAGE_BYTES: usize = 1 << 20;
 const MAX_UPLOAD_BYTES: usize = 512 << 20;
 /// Bytes of randomness in the address.
 const TOKEN_BYTES: usize = 16;
-/// A result file may run its own scripts without access to anything, the page included.
+/// Policy of a result file: it may run its own scripts, without access to anything else, including the page.
 const FILE_POLICY: &str = "sandbox allow-scripts allow-downloads; default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; \
      img-src data:; base-uri 'none'; form-action 'none'; frame-ancestors 'self'";
 
@@ -133,7 +133,7 @@ async fn message(
     json(with_studio(shared, move |studio| studio.call(&name, &body)).await)
 }
 
-/// Runs `work` on a thread of its own; a panic there is reported and leaves the studio usable.
+/// Runs `work` on a separate thread; a panic there is reported and the studio remains usable.
 async fn with_studio<T: Send + 'static>(
     shared: Arc<Shared>,
     work: impl FnOnce(&mut Studio) -> Result<T, Problem> + Send + 'static,

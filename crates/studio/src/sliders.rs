@@ -1,10 +1,10 @@
-//! Sliders: the positions of every number of a phantom, and the value that a position or a text stands for.
+//! Sliders: the positions of every parameter of a phantom, and the conversion of a position or text to a value.
 
 use crate::messages::{Problem, SliderView, Target};
 use stylet_report::significant;
 use stylet_tissue::ParameterInfo;
 
-/// Positions of a slider besides the one that switches off.
+/// Positions of a slider, without the one that switches off.
 const POSITIONS: usize = 160;
 /// Significant digits of a value that a slider sets, and of one that is shown.
 const DIGITS: usize = 4;
@@ -111,8 +111,7 @@ impl Scale {
 
     /// The SI value of a target; `None` where the number is absent.
     ///
-    /// # Errors
-    /// When a text is no number, or the number must not be absent.
+    /// # Errors When a text is not a number, or the number must not be absent.
     pub fn value(&self, to: &Target) -> Result<Option<f64>, Problem> {
         match to {
             Target::Position(position) if self.optional && *position >= self.values.len() => Ok(None),

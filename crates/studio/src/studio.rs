@@ -1,5 +1,5 @@
-//! The studio: state of one workspace. It knows nothing of HTTP: `Studio::call` maps the name and JSON body of a request to the JSON of
-//! the answer, so that another transport can serve the same page.
+//! State of one workspace, independent of HTTP: `Studio::call` maps the name and JSON body of a request to the JSON of the answer, so
+//! that another transport can serve the same page.
 
 use crate::messages::*;
 use crate::phantom_view::{self, view};
@@ -22,20 +22,20 @@ pub struct Loaded {
     pub notes: Vec<QualityNote>,
 }
 
-/// What undo restores.
+/// State restored by undo.
 #[derive(Clone, PartialEq)]
 pub struct Snapshot {
     pub phantom: Scenario,
     pub map: Option<ColumnMap>,
 }
 
-/// One workspace and what is kept in memory of it.
+/// One workspace with its data in memory.
 pub struct Studio {
     pub(crate) workspace: Workspace,
     pub(crate) now: Snapshot,
     pub(crate) undo: Vec<Snapshot>,
     pub(crate) redo: Vec<Snapshot>,
-    /// Movement of the mouse that the last edit belonged to.
+    /// Mouse drag of the last edit.
     pub(crate) stroke: Option<u64>,
     loaded: Vec<(String, Arc<Loaded>)>,
     /// Outputs of the online algorithm for the recording shown last.
@@ -93,7 +93,7 @@ impl Studio {
         self.workspace.result_file(folder, name)
     }
 
-    /// Everything that the page shows besides curves.
+    /// State of the page, without curves.
     pub(crate) fn state(&self) -> Result<Value, Problem> {
         Ok(json!({
             "version": env!("CARGO_PKG_VERSION"),
@@ -112,7 +112,7 @@ impl Studio {
         }))
     }
 
-    /// Makes a change that undo takes back. A workspace that has a folder is kept up to date.
+    /// Makes an undoable change. A workspace with a folder is updated on disk.
     pub(crate) fn change(&mut self, to: Snapshot, step: bool, keep: bool) -> Result<(), Problem> {
         if step && to != self.now {
             self.undo.push(self.now.clone());
@@ -138,7 +138,7 @@ impl Studio {
         match &self.now.map {
             Some(map) => self.workspace.write(MAP, map.to_ron().as_bytes()),
             None => {
-                // There may be none.
+                // The file may not exist.
                 let _ = std::fs::remove_file(self.workspace.path(MAP));
                 Ok(())
             }

@@ -46,7 +46,7 @@ impl Workspace {
             })?,
             Err(_) => Journal::default(),
         };
-        // Names in a file are not to be trusted.
+        // Names in a file are untrusted.
         journal
             .files
             .retain(|name| file_name(name).as_ref() == Some(name) && root.join("data").join(name).is_file());
@@ -137,7 +137,7 @@ impl Workspace {
         (1..=MAX_FILES + 1).map(numbered).find(|name| !is_taken(name)).unwrap_or_else(|| name.to_owned())
     }
 
-    /// Forgets a recording and removes it from the workspace.
+    /// Removes a recording from the workspace.
     ///
     /// # Errors
     /// When there is no such recording.
@@ -197,7 +197,7 @@ pub fn file_name(given: &str) -> Option<String> {
     let name: String = last.chars().map(safe).collect();
     let name = name.trim_start_matches('.');
     let surplus = name.chars().count().saturating_sub(MAX_NAME);
-    // The ending stays.
+    // Keep the extension.
     let name: String = name.chars().skip(surplus).collect();
     let name = name.trim_start_matches('.');
     (!name.is_empty()).then(|| name.to_owned())

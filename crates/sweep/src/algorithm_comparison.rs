@@ -1,4 +1,4 @@
-//! Several algorithms on the same simulated insertions: one row of errors per scenario and algorithm.
+//! Comparison of algorithms on the same simulated insertions: one row of errors per scenario and algorithm.
 
 use crate::sampling_design::sampling_phase;
 use crate::trial_simulation::{self, Workspace};
@@ -137,7 +137,7 @@ pub fn compare_algorithm(
 ) -> Result<ComparisonRow, SimulateError> {
     let mut scenario = scenario.clone();
     scenario.enhance.algorithm = algorithm;
-    // In the order of the seeds, so that the bytes do not depend on the threads.
+    // In the order of the seeds, so that the result does not depend on the number of threads.
     let scores: Vec<Score> = (0..seeds)
         .into_par_iter()
         .map_init(Workspace::default, |workspace, seed| {

@@ -7,14 +7,14 @@ use stylet_scenario::{Scenario, set_fields};
 /// Consecutive invalid draws after which the sweep fails.
 pub const MAX_DRAW_ATTEMPTS: u32 = 100;
 
-/// A trial that is ready to run.
+/// A drawn trial.
 #[derive(Clone, Debug)]
 pub struct DrawnTrial {
     /// Number of the trial, from 0.
     pub trial: u64,
     /// Seed of its noise.
     pub seed: u64,
-    /// Draws rejected because they make no valid scenario.
+    /// Number of draws rejected because their scenario is invalid.
     pub redrawn: u32,
     /// Values of `vary`, then 1 or 0 for each effect of the sweep.
     pub values: Vec<f64>,

@@ -49,7 +49,7 @@ pub struct Expectation {
     pub at_least: Option<f64>,
 }
 
-/// Insertions and the bounds on their scores.
+/// A gate: insertions and the bounds on their scores.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Gate {
@@ -226,7 +226,7 @@ impl LoadedGate {
             Statistic::Mean => mean_interval(&all),
             Statistic::Worst => all.last().map(|x| exact(*x)),
         };
-        // A score that no insertion has fails.
+        // A score that is missing in all insertions fails.
         let passed = found.is_some_and(|f| {
             e.at_most.is_none_or(|bound| f.high <= bound) && e.at_least.is_none_or(|bound| f.low >= bound)
         });
@@ -305,7 +305,7 @@ pub fn junit_xml(judged: &[GateResult]) -> String {
     xml
 }
 
-/// A text as an attribute of XML 1.0, which has no form for most control characters: they become U+FFFD.
+/// Escapes a text for an attribute of XML 1.0, which cannot contain most control characters: they become U+FFFD.
 fn escape_xml(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {

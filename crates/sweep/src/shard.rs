@@ -68,11 +68,11 @@ pub enum ShardError {
     Foreign {
         /// File.
         path: String,
-        /// Sweep, version, seed, number of trials, range.
+        /// Property that differs: sweep, version, seed, number of trials, range.
         what: &'static str,
-        /// What it has.
+        /// Its value.
         found: String,
-        /// What it should have.
+        /// The expected value.
         expected: String,
     },
     /// It is damaged.
@@ -80,7 +80,7 @@ pub enum ShardError {
     Damaged {
         /// File.
         path: String,
-        /// What is wrong.
+        /// Cause.
         why: String,
     },
 }
@@ -249,8 +249,8 @@ pub fn read(
         .collect())
 }
 
-/// Removes the shards in the folder and what interrupted writers left of some; then the folder, unless it holds other files. What cannot be
-/// removed stays: the results are complete without it.
+/// Removes the shards in the folder and partial files of interrupted writers; then the folder, unless it holds other files. Files that
+/// cannot be removed are ignored: the results are complete without them.
 pub fn remove_all(out: &Path) {
     let folder = out.join(SHARD_FOLDER);
     for entry in fs::read_dir(&folder).into_iter().flatten().flatten() {

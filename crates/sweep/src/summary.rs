@@ -113,7 +113,7 @@ pub fn failed(columns: &Columns, row: &TrialRow) -> bool {
     ["missed", "false"].iter().any(|s| score_value(columns, row, s) > 0.0)
 }
 
-/// A score of a row; NaN when it does not exist.
+/// A score of a row; NaN if missing.
 #[must_use]
 pub fn score_value(columns: &Columns, row: &TrialRow, score: &str) -> f64 {
     columns.score(score).and_then(|i| row.values.get(i)).copied().unwrap_or(f64::NAN)
@@ -240,7 +240,7 @@ fn explained<T: TrialTable + ?Sized>(
 ) -> Result<Vec<OutcomeSensitivity>, T::Error> {
     let mut found = Vec::new();
     for (outcome, scores) in OUTCOMES {
-        // -0.0 is the neutral element of addition, also for a sum of -0.0.
+        // Start from -0.0, the neutral element of addition.
         let mut y = vec![-0.0; rows.count()];
         for name in scores {
             y.iter_mut().zip(score_column(columns, rows, name)?).for_each(|(sum, x)| *sum += x);

@@ -1,4 +1,4 @@
-//! A sweep: its file with its scenario, checked.
+//! A validated sweep file with its scenario.
 
 use crate::sampling_design::MAX_SOBOL_DIMENSIONS;
 use sha2::{Digest, Sha256};

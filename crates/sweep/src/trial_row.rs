@@ -12,7 +12,7 @@ pub struct TrialRow {
     pub trial: u64,
     /// Seed of its noise.
     pub seed: u64,
-    /// Draws rejected because they make no valid scenario.
+    /// Number of draws rejected because their scenario is invalid.
     pub redrawn: u64,
     /// Drawn values, then scores; NaN where a score does not exist.
     pub values: Vec<f64>,

@@ -14,7 +14,7 @@ use stylet_tissue::{ForceLaw, ForceLawState, Rupture};
 /// Samples per block; a block fits into the level 1 cache.
 const BLOCK_SAMPLES: usize = 64;
 
-/// A block of samples on its way from motion to score. Its steps are not inlined, so that each has all registers.
+/// A block of samples from motion to score. Its steps are not inlined, so that each can use all registers.
 struct Block {
     count: usize,
     points: [MotionPoint; BLOCK_SAMPLES],

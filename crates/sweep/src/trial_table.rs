@@ -61,7 +61,7 @@ impl TrialTable for [TrialRow] {
     }
 }
 
-/// Columns before the values: trial, seed and redrawn as two 32-bit halves each, which an `f64` holds exactly.
+/// Number of columns before the values: trial, seed and redrawn as two 32-bit halves each, which are exact as `f64`.
 const INTEGER_COLUMNS: usize = 6;
 
 /// Writes rows to disk.

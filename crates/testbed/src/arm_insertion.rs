@@ -118,7 +118,7 @@ impl Zeroing {
         }
     }
 
-    /// After step `k`.
+    /// Updates the window after step `k`.
     fn step(&mut self, k: i64, rig: &mut ArmSimulation, recorded_n: &mut [f64]) -> Result<(), Error> {
         let Some((from, until)) = self.window else { return Ok(()) };
         if k == from

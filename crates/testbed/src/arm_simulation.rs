@@ -8,13 +8,13 @@ use stylet_dynamics::feasibility;
 use stylet_dynamics::{Arm, EARTH_GRAVITY_MPS2, Error, JointVector};
 use stylet_scenario::{ArmConfig, ArmInsertionLine, MotionPoint, VirtualSensor};
 
-/// Why the arm stops.
+/// Error of an insertion by the arm.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ArmError {
     /// The arm cannot be set up.
     #[error("the arm cannot be set up: {0}")]
     Setup(#[from] Error),
-    /// rapier refuses the arm.
+    /// rapier rejects the arm's joints.
     #[error(transparent)]
     Chain(#[from] ArmChainError),
     /// A limit was exceeded, or a value is not finite, during the motion.

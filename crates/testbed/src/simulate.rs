@@ -9,21 +9,21 @@ use stylet_record::{LayerTruth, Recording, TrueRupture, Truth};
 use stylet_scenario::{FieldError, ForceTorque, MotionPlan, MotionPoint, Robot, Scenario, Sensor};
 use stylet_tissue::{AnyEffect, ChainStage, Effect, ForceLaw, Rupture, Slab, TooManyEffects};
 
-/// Why a scenario cannot be simulated.
+/// Error of a simulation.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulateError {
-    /// `motion: Recorded` has no motion of its own.
+    /// `motion: Recorded` does not define a motion.
     #[error(
         "the motion is `Recorded`: it comes with measured data; give the scenario a motion to simulate it"
     )]
     NoMotion,
-    /// More effects act on the tissue than the law holds.
+    /// More effects act on the tissue than a force law supports.
     #[error(transparent)]
     Effects(#[from] TooManyEffects),
     /// A value is out of range; scenarios that were checked have none.
     #[error("{}: {}", .0.path, .0.message)]
     InvalidScenario(FieldError),
-    /// An effect that is not in the library has no value, or one beyond all measure, at its parameters.
+    /// A custom effect gives a value that is not finite or too large.
     #[error(
         "the force is {force_n} N at {time_s} s with {effects}: the formula has no value there, or grows without limit; change its parameters, or the \
          formula"
@@ -131,8 +131,7 @@ pub fn sample_rates(scenario: &Scenario, duration_s: f64) -> SampleRates {
 
 /// Simulates a scenario with the noise of `seed`. The same scenario and seed give the same bits.
 ///
-/// # Errors
-/// [`SimulateError`] when the scenario has no motion of its own or cannot be simulated.
+/// # Errors [`SimulateError`] when the scenario does not define a motion or cannot be simulated.
 pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateError> {
     let plan = scenario.motion.plan().ok_or(SimulateError::NoMotion)?;
     let law = ForceLaw::new(&scenario.tissue, &scenario.effects)?;
@@ -207,10 +206,10 @@ pub fn simulate(scenario: &Scenario, seed: u64) -> Result<Simulation, SimulateEr
     })
 }
 
-/// Largest force in N of a simulation with custom effects; a physics engine loses its digits beyond.
+/// Largest force in N of a simulation with custom effects; beyond it the physics engine loses precision.
 const MAX_FORCE_N: f64 = 1e6;
 
-/// Replays the motion with effects that are not in the library, whose forces may have no value.
+/// Replays the motion with custom effects, to check that their forces are finite.
 fn check_custom_effects(
     scenario: &Scenario,
     plan: &MotionPlan,

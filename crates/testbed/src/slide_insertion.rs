@@ -47,10 +47,10 @@ pub fn simulate_replay(
     }
 }
 
-/// Velocity and acceleration of a body at the instant of its position.
+/// Velocity and acceleration of a body at the time of its position.
 ///
 /// rapier integrates by semi-implicit Euler: the velocity of a body is the mean over the step that ended, half a step earlier than its position. The
-/// drive's deviation from the commanded mean of that step is added to the command of the instant.
+/// drive's deviation from the commanded mean of that step is added to the commanded velocity at that time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct InstantVelocity {
     commanded: MotionPoint,
@@ -61,7 +61,7 @@ pub(crate) struct InstantVelocity {
 }
 
 impl InstantVelocity {
-    /// At the first instant, where the body moves as commanded.
+    /// State at the first sample, where the body moves as commanded.
     pub(crate) fn new(start: MotionPoint, dt_s: f64) -> Self {
         let mean_mps = start.velocity_mps;
         Self { commanded: start, mean_mps, deviation_mps: 0.0, dt_s }
@@ -74,7 +74,7 @@ impl InstantVelocity {
         self.mean_mps
     }
 
-    /// Velocity (m/s) and acceleration (m/s²) at the instant, from the body's velocity over the step that ended.
+    /// Velocity (m/s) and acceleration (m/s²) at the end of the step, from the body's mean velocity over it.
     pub(crate) fn at_instant(&mut self, body_mps: f64) -> (f64, f64) {
         let deviation_mps = body_mps - self.mean_mps;
         let deviation_mps2 = (deviation_mps - self.deviation_mps) / self.dt_s;

@@ -57,7 +57,7 @@ impl JointTorqueSensors {
 /// the value of `r` in the air; axial force `f = -F . u` (`docs/reference/model.md`, *Sensors*; `stylet_dynamics::Observer`).
 #[derive(Debug)]
 pub struct AxialForceObserver {
-    /// When it differs from the true model.
+    /// The assumed model, if it differs from the true one.
     assumed: Option<Arm<7>>,
     observer: Observer<7>,
     state: ObserverState<7>,

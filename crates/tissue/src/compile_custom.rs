@@ -63,7 +63,7 @@ struct Compiled {
 static COMPILED: GrowingList<Compiled> = GrowingList::new();
 
 impl Custom {
-    /// Compiles a text. Equal texts share one definition, whatever the values of their parameters.
+    /// Compiles a text. Texts that differ only in parameter values share one definition.
     ///
     /// # Errors
     /// [`CustomError`] with the field, and the place in its formula.

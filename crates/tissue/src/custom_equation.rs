@@ -39,9 +39,9 @@ pub struct EquationSample {
     pub force_n: f64,
 }
 
-/// The equation of a custom effect. It has no state of its own: the same arguments give the same result.
+/// The equation of a custom effect. It is stateless: the same arguments give the same result.
 ///
-/// A result that is not finite refuses the parameter values in a fit, and ends a simulation with an error.
+/// In a fit, a result that is not finite rejects the parameter values; in a simulation it is an error.
 pub trait Equation: Debug + Send + Sync {
     /// Force in N, or length in m at [`Place::Motion`], for parameters and states in the order of the definition.
     fn value(&self, sample: &EquationSample, parameters: &[f64], states: &[f64]) -> f64;
@@ -82,7 +82,7 @@ pub struct CustomDefinition {
     pub text: Option<CustomText>,
 }
 
-/// Two definitions are equal when they are the same one.
+/// Definitions are compared by identity.
 impl PartialEq for CustomDefinition {
     fn eq(&self, other: &Self) -> bool {
         core::ptr::eq(self, other)

@@ -1,4 +1,4 @@
-//! Names and definitions that live as long as the program: equal ones are stored once.
+//! Interned names and definitions with static lifetime: equal ones are stored once.
 
 use alloc::boxed::Box;
 use alloc::string::String;
@@ -24,7 +24,7 @@ impl<T> GrowingList<T> {
         core::iter::successors(self.first.get(), |entry| entry.next.get()).map(|entry| &entry.value)
     }
 
-    /// The first entry that `is_it` accepts, or else a new one.
+    /// The first entry that `is_it` accepts; if there is none, a new one from `make`.
     ///
     /// # Errors
     /// That of `make`.
@@ -41,7 +41,7 @@ impl<T> GrowingList<T> {
             slot = &entry.next;
         }
         let new: &'static Entry<T> = Box::leak(Box::new(Entry { value: make()?, next: OnceRef::new() }));
-        // Where another thread was faster, the entry goes behind its.
+        // If another thread was faster, append behind its entry.
         while slot.set(new).is_err() {
             if let Some(entry) = slot.get() {
                 slot = &entry.next;
@@ -53,7 +53,7 @@ impl<T> GrowingList<T> {
 
 static NAMES: GrowingList<String> = GrowingList::new();
 
-/// The name, for as long as the program lives.
+/// The name with static lifetime.
 pub(crate) fn static_name(name: &str) -> &'static str {
     let made = NAMES.find_or_add(|known| known == name, || Ok::<_, core::convert::Infallible>(name.into()));
     match made {

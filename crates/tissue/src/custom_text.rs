@@ -66,7 +66,7 @@ pub struct ParameterText {
 }
 
 /// Where a parameter is expected. A search looks between the points that leave 2.5 % on either side. The prior of a parameter
-/// that is no strength also enters the fit.
+/// that is not a strength also enters the fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Prior {
@@ -165,8 +165,8 @@ mod named_list_serde {
         }
     }
 
-    /// A key without quotes. Formats write the names of variants so, and those live as long as the program; the same holds
-    /// for the names of definitions.
+    /// A key written without quotes, as formats write the names of variants. Such names have static lifetime, as those of
+    /// definitions have.
     struct Key(&'static str);
 
     impl Serialize for Key {

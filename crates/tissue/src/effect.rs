@@ -1,8 +1,8 @@
 //! The trait of an effect: one departure from the base law, with its stage in the measurement chain.
 //!
-//! An effect is configuration only. What it carries from sample to sample is an [`EffectState`] that the force law keeps
-//! for it, so that a law can be shared and its state copied. Every hook has a pass-through default; an effect overrides
-//! those of its [`ChainStage`].
+//! An effect is configuration only. Its state between samples is an [`EffectState`] kept by the force law's state, so that a
+//! law can be shared and its state copied. Every hook has a pass-through default; an effect overrides those of its
+//! [`ChainStage`].
 
 use crate::chain_stage::ChainStage;
 use crate::effect_info::EffectInfo;
@@ -92,8 +92,8 @@ pub trait Effect {
         self.info().stage
     }
 
-    /// Whether the parameters make the effect vanish. An inactive effect is left out of the chain, so that the base law
-    /// comes back bit for bit.
+    /// Whether the parameters make the effect vanish. Inactive effects are left out of the chain, so that the result is bit
+    /// for bit that of the base law.
     fn is_inactive(&self) -> bool;
 
     /// Whether the effect uses its [`EffectState`].

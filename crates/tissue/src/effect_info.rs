@@ -13,7 +13,7 @@ pub struct EffectInfo {
     pub equation: &'static str,
     /// Literature, or where it was measured.
     pub source: &'static str,
-    /// How it is recognised in a recording.
+    /// Signature by which it is recognised in a recording.
     pub signature: &'static str,
     /// Stage in the chain.
     pub stage: ChainStage,
@@ -23,7 +23,7 @@ pub struct EffectInfo {
     pub extended: Option<&'static EffectInfo>,
     /// Start values of a search for it.
     pub proposal: Proposal,
-    /// Ids of effects that hold this one as a special case.
+    /// Ids of effects that contain this one as a special case.
     pub nested_in: &'static [&'static str],
     /// Whether the effect also fits forces of another origin: a tone or a tissue motion fits any periodic force, presliding
     /// friction any hysteresis at a reversal. Together with an unmodelled force such an effect needs stronger evidence.
@@ -126,7 +126,7 @@ pub struct ParameterInfo {
     pub log: bool,
     /// Whether only integers are valid.
     pub integer: bool,
-    /// Whether it is the frequency of a clock of its own, independent of the commanded motion.
+    /// Whether it is a frequency that does not depend on the commanded motion.
     pub clock: bool,
     /// Typical standard deviation between recordings; zero for a parameter that is common to all.
     pub between_recordings_sd: f64,
@@ -217,7 +217,7 @@ impl ParameterInfo {
         Self { measured_prior: Some((mean, sd)), ..self }
     }
 
-    /// The frequency of a clock of its own.
+    /// Marks a frequency that does not depend on the commanded motion.
     #[must_use]
     pub const fn clock(self) -> Self {
         Self { clock: true, ..self }

@@ -8,8 +8,7 @@
 //! - friction `f_B = v sum_i b_i l_i`, `l_i = clamp(z - s_i, 0, d_i)`;
 //! - `f = f_K + f_B`; a ruptured layer stays ruptured in retraction.
 //!
-//! Effects are sorted by stage, and each stage knows its range of them, so that a hook is called only for the effects that
-//! may override it.
+//! Effects are sorted and indexed by stage, so that a hook is called only for the effects that may override it.
 
 use crate::chain_stage::ChainStage;
 use crate::effect::{Effect, EffectState, InsertionState, TipState};
@@ -186,13 +185,13 @@ impl ForceLaw {
         }
     }
 
-    /// [`ForceLaw::step`] with imposed ruptures: at this sample the first `ruptured` layers are ruptured, whatever their
-    /// force and the tip's position. Reports the rupture criterion of the layer that was active before, and of every layer
-    /// that becomes active in this step.
+    /// [`ForceLaw::step`] with imposed ruptures: at this sample the first `ruptured` layers are ruptured, regardless of
+    /// their force and the tip's position. Reports the rupture criterion of the layer that was active before, and of every
+    /// layer that becomes active in this step.
     ///
     /// For fitting: with ruptures imposed where the measured data show them, the force is smooth in nearly every parameter,
-    /// and the criterion tells how far the force law is from rupturing there by itself. With the law's own ruptures
-    /// imposed, the result is bit for bit that of [`ForceLaw::step`].
+    /// and the criterion shows how far the force law is from rupturing there by itself. With the law's own ruptures imposed,
+    /// the result is bit for bit that of [`ForceLaw::step`].
     #[inline]
     pub fn step_imposed(
         &self,

@@ -40,7 +40,7 @@ impl Slab {
             && self.release_m == 0.0
     }
 
-    /// Whether the layer's layer_m spring is nonlinear.
+    /// Whether the layer's spring is nonlinear.
     #[must_use]
     #[inline]
     pub(crate) fn is_curved(&self) -> bool {

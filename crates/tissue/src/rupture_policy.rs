@@ -48,7 +48,7 @@ impl<F: FnMut(Rupture)> RupturePolicy for CriterionRuptures<F> {
     }
 }
 
-/// The first `ruptured` layers are ruptured, whatever the criterion.
+/// Ruptures exactly the first `ruptured` layers, regardless of the criterion.
 pub(crate) struct ImposedRuptures<F> {
     pub ruptured: usize,
     pub on_criterion: F,

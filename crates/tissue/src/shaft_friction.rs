@@ -5,12 +5,12 @@ use crate::force_law::ForceLaw;
 use crate::force_law_state::ForceLawState;
 use crate::measurement_chain::{MeasurementChain, MeasurementState, SensorInput};
 
-/// Friction along the shaft, predicted sample by sample without later samples.
+/// Causal prediction of the friction along the shaft, sample by sample.
 ///
 /// While advancing it is the friction of the passed layers, the difference of total and tip force
 /// ([`TissueForce::tip_n`](crate::TissueForce::tip_n)); in retraction it is the whole friction, since no force acts on the
 /// tip. It passes through the sensor effects that scale, lag or delay a force; bias, drift, interference and drive friction
-/// are no friction of the shaft, and clipping and rounding are not modelled.
+/// are left out, and clipping and rounding are not modelled.
 #[derive(Clone, Debug)]
 pub struct ShaftFriction {
     law: ForceLaw,
@@ -20,8 +20,8 @@ pub struct ShaftFriction {
 }
 
 impl ShaftFriction {
-    /// The friction of `law` as recorded at about `sample_hz` through those of the `effects` that pass friction on as they
-    /// pass any force.
+    /// The friction of `law` as recorded at about `sample_hz`, through those sensor effects among `effects` that scale, lag
+    /// or delay a force.
     #[must_use]
     pub fn new(law: ForceLaw, effects: &[AnyEffect], sample_hz: f64) -> Self {
         let passes = |e: &&AnyEffect| {

@@ -25,7 +25,7 @@ pub fn export(args: &BenchmarkExportArgs) -> Result<(), Failure> {
     ))
 }
 
-/// Gives streams to a detector and keeps its answers.
+/// Replays streams to a detector and writes its answers.
 ///
 /// # Errors
 /// [`Failure`] with the exit code that fits.
@@ -47,7 +47,7 @@ pub fn replay(args: &BenchmarkReplayArgs) -> Result<(), Failure> {
     print(&format!("{name}: {samples} samples of {streams} streams; answers in {}\n", args.out.display()))
 }
 
-/// Judges answers.
+/// Scores answers.
 ///
 /// # Errors
 /// [`Failure`] with the exit code that fits.

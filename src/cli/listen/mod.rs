@@ -30,7 +30,7 @@ const WAITING_PIECES: usize = 16;
 /// Exit code after a second signal: 128 and the number of SIGINT.
 const INTERRUPTED_AGAIN: i32 = 130;
 
-/// When to end: a signal, an output that has failed, or the duration.
+/// Stop conditions: a signal, a failed output, or the duration.
 struct End {
     requested: Arc<AtomicBool>,
     at: Option<Instant>,
@@ -60,8 +60,7 @@ impl End {
 
 /// Runs the command.
 ///
-/// # Errors
-/// [`Failure`] with the exit code that fits; the summary is printed all the same.
+/// # Errors [`Failure`] with its exit code; the summary is printed in any case.
 pub fn listen(args: &ListenArgs) -> Result<(), Failure> {
     let mut config = args.config.as_deref().map(EnhancerConfigFile::load).transpose()?.unwrap_or_default();
     if let Some(contact) = args.contact {
@@ -108,7 +107,7 @@ fn serve_page(host: &str, port: u16, broadcast: &Arc<Broadcast>) -> Result<LiveS
     Ok(page)
 }
 
-/// Stands for the page in a program that was built without it.
+/// Placeholder for the page in a build without it.
 #[cfg(not(feature = "studio"))]
 struct LiveServer;
 
@@ -173,7 +172,7 @@ fn read_stdin(
             Err(RecvTimeoutError::Disconnected) => break,
         }
     }
-    // What had arrived before a signal.
+    // Process what had arrived before a signal.
     for (piece, arrived) in pieces.try_iter().take(WAITING_PIECES).flatten() {
         splitter.push(&piece, |line| session.process_line(line, arrived, &mut report));
     }

@@ -11,10 +11,10 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use stylet_api::live_stream::{Broadcast, Subscriber};
 
-/// Interval between looks at a thread that is ending.
+/// Polling interval for a thread that is ending.
 const JOIN_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Waits for a thread, for at most `wait` if given; `None` when it has not ended or has panicked, which it reports itself.
+/// Waits for a thread, for at most `wait` if given; `None` if it has not ended or has panicked (a panic reports itself).
 fn join<T>(thread: JoinHandle<T>, wait: Option<Duration>) -> Option<T> {
     if let Some(wait) = wait {
         let until = Instant::now() + wait;
@@ -32,7 +32,8 @@ fn join<T>(thread: JoinHandle<T>, wait: Option<Duration>) -> Option<T> {
 pub struct Printer(JoinHandle<std::io::Result<()>>);
 
 impl Printer {
-    /// Starts the thread. When standard output cannot be written any more, it sets `stop`, if given, and says so otherwise.
+    /// Starts the thread. If standard output cannot be written any more, it sets `stop`, or prints an error if `stop` is not
+    /// given.
     pub fn start(broadcast: &Arc<Broadcast>, stop: Option<Arc<AtomicBool>>) -> Result<Self, Failure> {
         let subscriber = broadcast.subscribe();
         let run = move || {
@@ -51,8 +52,7 @@ impl Printer {
 
     /// Waits for the last lines.
     ///
-    /// # Errors
-    /// [`Failure::Stdout`] when lines could not be printed; a reader that has closed the pipe is no error.
+    /// # Errors [`Failure::Stdout`] when lines could not be printed; a reader that has closed the pipe is not an error.
     pub fn finish(self, wait: Option<Duration>) -> Result<(), Failure> {
         match join(self.0, wait) {
             Some(Err(why)) if why.kind() != ErrorKind::BrokenPipe => Err(Failure::Stdout(why)),
@@ -117,7 +117,7 @@ impl Forwarder {
         Ok(Self { thread, not_sent })
     }
 
-    /// Waits for the last lines; the number of lines that could not be sent.
+    /// Waits for the last lines; returns the number of lines that could not be sent.
     pub fn finish(self, wait: Option<Duration>) -> u64 {
         join(self.thread, wait);
         self.not_sent.load(Ordering::Relaxed)

@@ -1,6 +1,6 @@
-//! How often waiting threads look whether they shall end.
+//! Polling interval of waiting threads.
 
 use std::time::Duration;
 
-/// Longest time without a look at the clock and at signals.
+/// Longest time between two checks of the clock and of signals.
 pub(super) const POLL_INTERVAL: Duration = Duration::from_millis(100);

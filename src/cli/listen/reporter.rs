@@ -6,7 +6,7 @@ use stylet_api::live_stream::Report;
 /// Messages of a kind that are printed.
 const PRINTED: u32 = 5;
 
-/// Prints reports, and says where it stops.
+/// Prints the first reports of each kind, with a note on the last one printed.
 #[derive(Default)]
 pub struct Reporter {
     invalid: u32,

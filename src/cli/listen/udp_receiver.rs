@@ -15,7 +15,7 @@ pub struct UdpReceiver {
     dropped: DropCounter,
 }
 
-/// What has arrived.
+/// A datagram, or nothing.
 pub enum Received<'a> {
     Datagram(&'a [u8]),
     /// Nothing within the poll interval.
@@ -92,7 +92,7 @@ struct DropCounter {
 
 #[cfg(target_os = "linux")]
 impl DropCounter {
-    /// Bytes of the kernel's buffer that are asked for: seconds of samples at 1 kHz. The system may grant fewer.
+    /// Requested size of the kernel's buffer in bytes: seconds of samples at 1 kHz. The system may grant less.
     const BUFFER_BYTES: usize = 1 << 23;
 
     fn new(socket: &UdpSocket) -> Self {

@@ -1,4 +1,4 @@
-//! `stylet gate`: bounds on scores, a baseline, exit code 1 when a bound does not hold.
+//! `stylet gate`: compares scores with bounds and a baseline; exit code 1 if a bound is violated.
 
 use super::thread_pool::with_threads;
 use crate::cli::args::GateArgs;
@@ -15,8 +15,7 @@ use stylet_sweep::score_gate::{
 
 /// The command.
 ///
-/// # Errors
-/// [`Failure::Gate`] when a bound does not hold, others when an input is wrong.
+/// # Errors [`Failure::Gate`] if a bound is violated, others if an input is wrong.
 pub fn gate(args: &GateArgs) -> Result<(), Failure> {
     let gates = load(&args.gates, args.seed)?;
     let at = args.baseline.clone().unwrap_or_else(|| args.gates.with_extension("baseline.json"));
@@ -53,15 +52,15 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
     }
     let printed = if text.is_empty() { Ok(()) } else { print(&text) };
     let failed = judged.iter().filter(|j| !j.passed).count();
-    // A bound that does not hold matters more than an output that cannot be printed.
+    // A violated bound takes precedence over an output that cannot be printed.
     if failed > 0 { Err(Failure::Gate { failed, of: judged.len() }) } else { printed }
 }
 
-/// Refuses to replace files by the results before the trials run.
+/// Checks before the trials that the results replace no foreign files.
 fn check_outputs(args: &GateArgs, baseline: &Path) -> Result<(), Failure> {
     let inputs = [args.gates.as_path(), baseline];
     if args.update {
-        // A file that is no baseline was refused when it was read.
+        // A file that is not a baseline was rejected when it was read.
         check_own_file(baseline, &inputs[..1], None, |_| true)?;
     }
     if let Some(junit) = &args.junit {

@@ -6,8 +6,7 @@ use stylet_scenario::Scenario;
 
 /// Answers a question as `stylet diagnose` would.
 ///
-/// # Errors
-/// The reason why there is no answer.
+/// # Errors The reason for a missing answer.
 pub fn answer_question(question: &Question) -> Result<Answer, String> {
     let (options, recordings) = (Options::default(), named_recordings(question));
     let result = if question.assumed_ron.is_some() {

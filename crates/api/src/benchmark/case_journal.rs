@@ -11,7 +11,7 @@ use std::sync::Mutex;
 
 /// A journal, open for appending.
 pub struct CaseJournal<T> {
-    /// The cases that it held when it was opened.
+    /// The cases read when it was opened.
     pub completed: Vec<T>,
     file: Mutex<File>,
 }

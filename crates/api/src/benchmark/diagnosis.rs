@@ -93,7 +93,7 @@ pub struct DiagnosisBenchmark {
 }
 
 impl DiagnosisBenchmark {
-    /// Locks the folder. With `from_journal` only the cases that its journal holds are selected.
+    /// Locks the folder. With `from_journal` only the cases in its journal are selected.
     ///
     /// # Errors
     /// [`Error::Output`], [`Error::Busy`].

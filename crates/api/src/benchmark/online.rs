@@ -1,4 +1,4 @@
-//! Benchmark of online puncture detection: replaying streams to a detector sample by sample, and judging answers.
+//! Benchmark of online puncture detection: replays streams to a detector sample by sample, and scores its events.
 
 use crate::error::Error;
 use crate::live_stream::{STORED_SAMPLES, VelocityEstimator};
@@ -24,7 +24,7 @@ fn request(error: ChallengeError) -> Error {
     Error::Request(error.to_string())
 }
 
-/// The streams that these words name; `all` stands for every row.
+/// The streams of the rows named by these words; `all` selects every row.
 ///
 /// # Errors
 /// [`Error::Request`] for an unknown word, with the known ones.
@@ -47,16 +47,16 @@ pub fn online_streams(
     Ok(stream_ids(world, &rows, split, cases, seed))
 }
 
-/// Who is given the samples.
+/// Detector under test.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Player {
-    /// A program with its arguments, started once per thread, spoken to through a pipe.
+    /// A program with its arguments, started once per thread; samples and replies go through a pipe.
     Program(Vec<String>),
     /// An algorithm of this project.
     Core(Algorithm),
 }
 
-/// What was said about one sample.
+/// Reply of a detector to one sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Reply {
     event: bool,
@@ -65,11 +65,11 @@ struct Reply {
     tip_force_n: Option<f64>,
 }
 
-/// Replays the streams of `folder` to a detector and writes its answers to the new folder `out`: `events.csv`, `entrant.json` and, where
-/// it gives a tip force, `enhanced/NNNN.csv`. Returns the number of samples. `done` is called after each stream.
+/// Replays the streams of `folder` to a detector and writes its answers to the new folder `out`: `events.csv`, `entrant.json` and, if it
+/// estimates the tip force, `enhanced/NNNN.csv`. Returns the number of samples. `done` is called after each stream.
 ///
-/// # Errors
-/// [`Error::Request`]: a file, or a reply that is none, with stream and sample. Nothing half-written stays.
+/// # Errors [`Error::Request`] for a file that cannot be used, or for an invalid reply, with stream and sample. Partial output is
+/// removed.
 pub fn replay_streams(
     folder: &Path,
     player: &Player,
@@ -102,7 +102,7 @@ struct Answers<'a> {
     done: &'a (dyn Fn() + Sync),
 }
 
-/// Events of a stream as lines, its number of samples, and the time that they took in s.
+/// Events of a stream as lines, its number of samples, and the processing time in s.
 struct StreamAnswer {
     events: String,
     samples: u64,
@@ -119,7 +119,7 @@ impl Answers<'_> {
         threads: usize,
     ) -> Result<u64, Error> {
         self.create_folder("enhanced")?;
-        // Detectors that wait for a stream; at most one per thread is started.
+        // Idle detectors; at most one per thread is started.
         let idle: Mutex<Vec<Detector>> = Mutex::new(Vec::new());
         let answers: Vec<StreamAnswer> = super::thread_pool(threads)?.install(|| {
             streams
@@ -191,13 +191,13 @@ impl Answers<'_> {
     }
 }
 
-/// A detector that is running.
+/// A running detector.
 enum Detector {
     Program(Pipe),
     Core(Box<OwnCore>),
 }
 
-/// An algorithm of this project with the velocities that it is given.
+/// An algorithm of this project, with velocities estimated from the positions.
 struct OwnCore {
     config: EnhanceConfig,
     core: Enhancer<Vec<Sample>>,
@@ -302,7 +302,7 @@ impl Pipe {
 
 impl Drop for Pipe {
     fn drop(&mut self) {
-        // The end of its input tells the program to end.
+        // Closing its input ends the program.
         self.to = None;
         let _ = self.child.wait();
     }
@@ -328,8 +328,7 @@ fn parse_reply(line: &str) -> Result<Reply, String> {
 
 /// Scores of the answers in these folders to the streams of `folder`, best F1 within 0.5 mm first.
 ///
-/// # Errors
-/// [`Error::Request`]: a file and its line.
+/// # Errors [`Error::Request`] with file and line.
 pub fn judge_online(folder: &Path, answers: &[PathBuf]) -> Result<Vec<EntrantScore>, Error> {
     let streams = streams_with_truth(folder).map_err(request)?;
     let mut scores = answers

@@ -54,10 +54,9 @@ impl IdentifiedModel {
         ShaftFriction::new(self.law.clone(), &self.effects, sample_hz)
     }
 
-    /// Checks that the configured algorithm takes a model.
+    /// Checks that the configured algorithm can use a model.
     ///
-    /// # Errors
-    /// [`Error::Request`] when it does not.
+    /// # Errors [`Error::Request`] when it cannot.
     pub fn check_algorithm(&self, config: &EnhanceConfig) -> Result<(), Error> {
         if config.active_algorithm() == Algorithm::Stylet {
             return Ok(());

@@ -31,7 +31,7 @@ pub(super) struct PlotSampler {
 }
 
 impl PlotSampler {
-    /// For a recording of this length and this number of runs.
+    /// Creates a sampler for a recording of this length and this number of runs.
     pub fn new(samples: usize, runs: usize) -> Self {
         let (curves, sections) = (curve_count(runs), section_count(samples, runs));
         Self {
@@ -44,7 +44,7 @@ impl PlotSampler {
         }
     }
 
-    /// Takes the next sample.
+    /// Adds the next sample.
     pub fn add(&mut self, index: usize, sample: &Sample, outs: &[Output]) {
         let plot_sample = || PlotSample { index, sample: *sample, outs: outs.to_vec() };
         if index >= self.end {

@@ -60,7 +60,7 @@ struct Layer {
     friction_unit: &'static str,
     drop_n: f64,
     cumulative_friction_added_ns_per_m: f64,
-    /// What cannot be about these numbers.
+    /// Estimates that are physically impossible, each with the reason.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     impossible: Vec<String>,
     /// 95 % intervals and cumulative friction, where the algorithm provides them.
@@ -95,7 +95,8 @@ fn interval(value: f64, sd: f64) -> [f64; 2] {
     [value - stylet_stats::Z95 * sd, value + stylet_stats::Z95 * sd]
 }
 
-/// What cannot be about an estimate: no layer pushes less than nothing. Names the number and why.
+/// Physically impossible values of an estimate (negative stiffness or friction beyond the interval, layer thicker than 1 m),
+/// each with the reason.
 #[must_use]
 pub fn impossible(e: &LayerEstimate) -> Vec<String> {
     let mut out = Vec::new();
@@ -164,7 +165,7 @@ pub(super) struct Event {
     time_s: f64,
     position_m: f64,
     drop_n: DropSize,
-    /// Probability that it is no false alarm, 0 to 1, where the algorithm provides it.
+    /// Probability that it is not a false alarm, 0 to 1, where the algorithm provides it.
     confidence: Option<f64>,
 }
 

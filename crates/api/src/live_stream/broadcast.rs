@@ -7,8 +7,8 @@ use std::time::Duration;
 
 /// Lines that the ring holds: 8 s at 1 kHz.
 const RING_LINES: usize = 8192;
-/// Most lines that a subscriber takes at once: a stalled one holds little memory, and the ring is locked for a short time only. Enough
-/// for 6 kHz at 25 updates per second.
+/// Most lines that a subscriber takes at once, which bounds its memory and the time that the ring is locked. Enough for 6 kHz at 25
+/// updates per second.
 const TAKE_LINES: usize = 256;
 
 /// The latest lines, numbered from the first one sent.
@@ -47,7 +47,7 @@ pub struct Subscriber {
     cursor: Arc<Cursor>,
 }
 
-/// A thread that panicked while holding the lock left whole lines behind.
+/// Locks, ignoring poisoning: lines are complete even if a thread panicked while holding the lock.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -142,7 +142,7 @@ impl Broadcast {
         let mut ring = match self.ring.try_lock() {
             Ok(ring) => ring,
             Err(TryLockError::Poisoned(ring)) => ring.into_inner(),
-            // The ring holds no more than its lines; these follow with the next one.
+            // A subscriber holds the ring: these lines follow with the next one.
             Err(TryLockError::WouldBlock) if late.len() < RING_LINES => return,
             Err(TryLockError::WouldBlock) => lock(&self.ring),
         };

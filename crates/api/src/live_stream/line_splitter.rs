@@ -10,8 +10,8 @@ pub struct LineSplitter {
 }
 
 impl LineSplitter {
-    /// Takes the next piece; calls `each` with every line that is complete. Of a line beyond [`MAX_LINE_BYTES`] it gets the
-    /// first bytes, one more than allowed.
+    /// Adds the next piece and calls `each` with every complete line. A line longer than [`MAX_LINE_BYTES`] is cut to one
+    /// byte more than that.
     pub fn push(&mut self, piece: &[u8], mut each: impl FnMut(&[u8])) {
         let mut lines = piece.split(|byte| *byte == b'\n').peekable();
         while let Some(line) = lines.next() {
@@ -29,7 +29,7 @@ impl LineSplitter {
         }
     }
 
-    /// Passes on a last line without its end.
+    /// Passes on a last line without a line break.
     pub fn finish(self, each: impl FnOnce(&[u8])) {
         if !self.partial.is_empty() {
             each(&self.partial);

@@ -17,7 +17,7 @@ pub struct StreamSample {
     pub velocity_mps: Option<f64>,
 }
 
-/// A line that is no sample.
+/// A line that is not a sample.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "line {line}: {message}; expected time_s,position_m,force_n[,velocity_mps] or a JSON object with these names"

@@ -21,14 +21,14 @@ pub struct StreamCounts {
     pub unused: u64,
     /// Restarts of the core because of a new clock.
     pub restarts: u64,
-    /// Lines that are no samples.
+    /// Lines that are not samples.
     pub bad_lines: u64,
     /// Ruptures declared, over all restarts.
     pub ruptures: u64,
     /// Datagrams that the system dropped before they could be received, as reported with the last one received; null where the
     /// system does not count them.
     pub dropped_by_system: Option<u64>,
-    /// Lines lost by slow subscribers; the core lost no samples by them.
+    /// Lines lost by slow subscribers; the core still processed these samples.
     pub dropped_by_readers: u64,
     /// Readers of the page that were refused because there were too many.
     pub refused_readers: u64,
@@ -40,10 +40,10 @@ pub struct StreamCounts {
     pub mean_delay_s: f64,
 }
 
-/// What the operator should read at once.
+/// Message that the operator should see at once.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Report {
-    /// A line that is no sample.
+    /// A line that is not a sample.
     #[error("{0}")]
     Invalid(InvalidLine),
     /// The core ignored a sample.
@@ -86,7 +86,7 @@ struct OutputLine<'a> {
     layer: Option<LayerLine>,
     /// Restarts of the core because of a new clock, so far.
     restarts: u64,
-    /// Lines that are no samples, so far.
+    /// Lines that are not samples, so far.
     bad_lines: u64,
     dropped: u64,
 }
@@ -161,7 +161,7 @@ impl Session {
         }
     }
 
-    /// Processes a datagram of one or more lines that arrived at `arrived`; calls `report` for what the operator should read.
+    /// Processes a datagram of one or more lines that arrived at `arrived`; calls `report` with messages for the operator.
     pub fn process_datagram(&mut self, bytes: &[u8], arrived: Instant, report: &mut dyn FnMut(Report)) {
         let bytes = bytes.strip_suffix(b"\n").unwrap_or(bytes);
         for line in bytes.split(|byte| *byte == b'\n') {

@@ -1,12 +1,12 @@
 //! Velocity as the slope of the latest positions.
 //!
-//! A straight line through the window has the velocity of its middle: behind a hand that trembles at 10 Hz it is late by a tenth of a
-//! period. A parabola has the velocity at its end, with four times the noise. It is used where its curvature stands out of the noise of
-//! the positions.
+//! The slope of a straight line through the window is the velocity at its middle, which lags a 10 Hz hand tremor by a tenth of a
+//! period. A parabola gives the velocity at the end of the window with four times the noise; it is used where its curvature is
+//! significant.
 
 use std::collections::VecDeque;
 
-/// Window in s: twenty intervals at 1 kHz, four at 200 Hz, and half a millisecond for stamps that are not exact.
+/// Window in s: twenty intervals at 1 kHz, four at 200 Hz, and 0.5 ms of tolerance for jitter of the time stamps.
 const WINDOW_S: f64 = 0.0205;
 /// Limits on the number of samples in the window.
 const MIN_SAMPLES: usize = 3;
@@ -79,7 +79,8 @@ impl WindowFit {
 }
 
 impl VelocityEstimator {
-    /// Velocity in m/s at a new position (m); zero from fewer than two positions. The position counts from [`Self::add`] on.
+    /// Velocity in m/s at a new position (m); zero from fewer than two positions. The position is not added to the window; see
+    /// [`Self::add`].
     pub(crate) fn at(&self, time_s: f64, position_m: f64) -> f64 {
         if self.points.back().is_none_or(|(before, _)| time_s <= *before) {
             return 0.0;
@@ -92,7 +93,7 @@ impl VelocityEstimator {
         if curved { fit.slope + fit.curvature * fit.end_slope } else { fit.slope }
     }
 
-    /// Takes a position that belongs to the motion.
+    /// Adds a position to the window.
     pub(crate) fn add(&mut self, time_s: f64, position_m: f64) {
         if self.points.back().is_some_and(|(before, _)| time_s <= *before) {
             self.points.clear();

@@ -14,7 +14,7 @@ pub const MANIFEST: &str = "manifest.json";
 pub(super) struct Manifest {
     pub(super) stylet: String,
     pub(super) sha256: BTreeMap<String, String>,
-    /// The input, in a folder that was named after it.
+    /// The input, if the folder was named after it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(super) input: Option<String>,
 }

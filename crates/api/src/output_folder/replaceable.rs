@@ -1,4 +1,4 @@
-//! Which existing files an output may replace: those that Stylet wrote, and never an input.
+//! Checks which existing files an output may replace: only files that Stylet wrote, and never an input.
 
 use super::manifest::{MANIFEST, Manifest, sum, sum_of_file};
 use crate::error::Error;
@@ -33,7 +33,7 @@ const INPUT: &str = "is an input of this command";
 pub struct Inputs {
     /// All files read.
     pub files: Vec<PathBuf>,
-    /// The one after which the output folder is named; `None` when the folder was given.
+    /// The input after which the output folder is named; `None` if the folder was given.
     pub names_folder: Option<PathBuf>,
 }
 
@@ -54,7 +54,7 @@ impl Content<'_> {
     }
 }
 
-/// Refuses an output folder in which this command, known by its result file, would replace foreign files or its inputs.
+/// Rejects an output folder in which this command, identified by its result file, would replace foreign files or its inputs.
 ///
 /// # Errors
 /// [`Error::NotReplaced`] with the first such file; [`Error::OtherInput`] for a folder named after another input.
@@ -63,7 +63,7 @@ pub fn check_folder(folder: &Path, result_file: &str, inputs: &Inputs) -> Result
         check_same_input(folder, &comparable(input))?;
     }
     let names = FILES.iter().find(|(result, _)| *result == result_file).map_or(&[][..], |(_, names)| names);
-    // An input that is an old file of the set may be what the new one repeats, which is only known later.
+    // An input may be an old file of the set with unchanged content; that is checked when the set is written.
     let inputs: Vec<_> = inputs.files.iter().filter(|input| !is_listed(folder, input)).collect();
     check_files(folder, &inputs, names.iter().map(|name| (*name, Content::Unknown)))
 }
@@ -73,7 +73,7 @@ fn is_listed(folder: &Path, input: &Path) -> bool {
     manifest.sha256.keys().any(|name| is_same(&folder.join(name), input))
 }
 
-/// As [`check_folder`], for files with known content: a file that would not change is no obstacle.
+/// As [`check_folder`], for files with known content: an unchanged file is accepted.
 pub(super) fn check_files<'a>(
     folder: &Path,
     inputs: &[impl AsRef<Path>],
@@ -109,7 +109,7 @@ pub(super) fn is_same(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Refuses a default folder that holds the results for another input than `input`.
+/// Rejects a default folder with the results for another input than `input`.
 ///
 /// # Errors
 /// [`Error::OtherInput`].
@@ -122,7 +122,7 @@ pub(super) fn check_same_input(folder: &Path, input: &str) -> Result<(), Error> 
     }
 }
 
-/// A path as it is kept in a manifest: without symbolic links, relative to the current folder where it lies below it.
+/// A path as stored in a manifest: without symbolic links, relative to the current folder if it is below it.
 pub(super) fn comparable(input: &Path) -> String {
     let full = input.canonicalize().unwrap_or_else(|_| input.to_path_buf());
     let here = std::env::current_dir().and_then(|here| here.canonicalize()).unwrap_or_default();
@@ -130,8 +130,7 @@ pub(super) fn comparable(input: &Path) -> String {
     relative.display().to_string()
 }
 
-/// Refuses to replace a file that is an input, or that `is_own` does not recognise as written by Stylet. A file that would not change is
-/// no obstacle.
+/// Rejects replacing a file that is an input, or that `is_own` does not recognise as written by Stylet. An unchanged file is accepted.
 ///
 /// # Errors
 /// [`Error::NotReplaced`].
@@ -146,7 +145,7 @@ pub fn check_own_file(
     }
     let refused = |why| Err(Error::NotReplaced { path: path.display().to_string(), why });
     let is_input = inputs.iter().any(|input| is_same(path, input));
-    // Devices and pipes, behind links too, are written to, not replaced; writing to a folder fails with a message of its own.
+    // Devices and pipes, also behind links, are written to, not replaced; writing to a folder is reported elsewhere.
     if !is_input && fs::metadata(path).is_ok_and(|found| !found.is_file()) {
         return Ok(());
     }

@@ -1,4 +1,4 @@
-//! Decisions in air: contact, steps of the zero, and which baseline is followed.
+//! Decisions in air from the evidence of [`super::air_history`]: contact, steps of the sensor's zero, form of the baseline.
 
 use super::air_history::{AirEvidence, BaselineFit, Form};
 use super::baseline::MIN_SAMPLES;
@@ -8,14 +8,14 @@ use super::state::{FAILED_MISFIT, KalmanEnhancer};
 use crate::config::{Contact, EnhanceConfig};
 use crate::sample::{Baseline, Sample, ZeroStep};
 
-/// Log odds at which a hypothesis about the air is acted upon: 7 to 1.
+/// Log odds at which a hypothesis is accepted: 7 to 1.
 const DECISION_NATS: f64 = 2.0;
-/// Log odds at which a contact is certain: 20 000 to 1.
+/// Log odds at which a contact is final: 20 000 to 1.
 const SETTLED_NATS: f64 = 10.0;
 
 impl KalmanEnhancer {
-    /// Looks at the air, after every quarter more of it and whenever the force leaves the baseline (`away`: above it 1,
-    /// below it -1). True when a contact has begun: the evidence says where.
+    /// Evaluates the hypotheses in air whenever the number of samples has grown by a quarter or the force leaves the baseline
+    /// (`away`: 1 above it, -1 below). Returns the evidence when a contact has begun.
     pub(super) fn look_at_air(&mut self, sample: &Sample, away: i8) -> Option<AirEvidence> {
         let due = self.baseline.history.samples >= self.baseline.next_evaluation;
         if !due && away == 0 || self.baseline.history.samples < MIN_SAMPLES {
@@ -29,7 +29,7 @@ impl KalmanEnhancer {
         if evidence.step_nats() > DECISION_NATS {
             self.absorb_step_in_air(sample, &evidence);
         } else if evidence.contact_nats() > DECISION_NATS {
-            // A baseline that moves may already follow the load, so that the force does not leave it.
+            // A moving baseline may already follow the load, so that the force does not leave it.
             let seen = away > 0 || self.baseline.moving || evidence.contact_nats() > SETTLED_NATS;
             return seen.then_some(evidence);
         } else if evidence.quiet.nats > evidence.bend.nats.max(evidence.step.nats) {
@@ -51,7 +51,7 @@ impl KalmanEnhancer {
         (self.samples_above_threshold, self.samples_below_threshold) = (0, 0);
     }
 
-    /// Noise and offset of the force less what is subtracted.
+    /// Re-initialises noise and offset of the force after subtraction of the baseline.
     fn restart_noise(&mut self, sample: &Sample, fit: &BaselineFit, excess: f64) {
         let history = &self.baseline.history;
         let (variance, rho) = (history.noise_variance(), history.rho());
@@ -83,7 +83,7 @@ impl KalmanEnhancer {
         (self.samples_above_threshold, self.samples_below_threshold) = (0, 0);
     }
 
-    /// Contact where the evidence has it, with the baseline from the air before.
+    /// Starts the contact at the bend of `evidence`, with the baseline fitted to the samples before it.
     #[cold]
     pub(super) fn start_contact_at_bend(
         &mut self,
@@ -107,7 +107,7 @@ impl KalmanEnhancer {
         if moving {
             self.set_estimator_baseline(&fit);
         }
-        // The line of the load crosses that of the baseline.
+        // The onset is where the loading line crosses the baseline.
         let variance = 4.0 * evidence.event_variance(&bend) + fit.p[0][0];
         self.output.contact_m = Some(onset_m);
         self.output.contact_probability = evidence.contact_probability();
@@ -115,15 +115,15 @@ impl KalmanEnhancer {
         self.baseline.schedule();
     }
 
-    /// Drift and line of a fit become unknowns of the layer estimator.
+    /// Makes drift and line of a fit unknowns of the layer estimator.
     pub(super) fn set_estimator_baseline(&mut self, fit: &BaselineFit) {
         self.estimator.set_baseline(fit, &self.noise);
         self.snapshot = self.estimator;
         self.free_tip.restart_from(&self.estimator);
     }
 
-    /// While a contact is not certain: takes the sample as one in air too, and cancels the contact when a moving baseline or a
-    /// step of the zero explains more.
+    /// Re-evaluates a contact that is not final, with the sample added to the history in air. Cancels the contact if a moving
+    /// baseline or a step of the zero is more probable.
     #[cold]
     pub(super) fn verify_evidence(&mut self, config: &EnhanceConfig, sample: &Sample) {
         if config.contact != Contact::Detected || self.estimator.passed_count > 0 {

@@ -1,5 +1,5 @@
-//! What the sensor reads in air: an offset that may drift in time, change with position (a cable, a guide, the weight of a
-//! tilted tool) or jump (the zero was set). A contact is a *bend* of the force that none of these explains.
+//! Hypotheses on the force in air: an offset that may drift in time, change with position (a cable, a guide, the weight of a tilted
+//! tool) or jump (a tare), and a contact, a *bend* of the force that none of these explains.
 //!
 //! The samples since the start are kept as block averages of growing length: eight single samples, then four blocks of two,
 //! of four, and so on, and a dozen equally long ones for everything older. [`AirHistory::evaluate`] compares,
@@ -9,50 +9,50 @@
 //! f = c,   f = c + d t,   f = c + g z
 //! ```
 //!
-//! each alone, with a step of the zero at any block, and with a bend `s (z - z_c)` from any block on. The noise of a block
-//! average follows from that of the differences of neighbouring samples, which no baseline changes; where even the best
-//! hypothesis leaves more than that, all evidence is divided by the excess.
+//! each alone, with a step of the zero at any block, and with a bend `s (z - z_c)` from any block on. The noise of a block average
+//! follows from the differences of neighbouring samples, which no baseline changes; if the best hypothesis leaves a larger residual
+//! variance, all log evidence is divided by the ratio.
 
 pub(super) use super::air_sums::Form;
 use super::air_sums::{Block, MIN_REMAINING_SHARE, Suffix, Totals};
 use super::gaussian::at_least;
 use crate::sample::{BaselineKind, Sample};
 
-/// Blocks of one length, and of the last length, an odd number.
+/// Blocks per level, and in the last level (an odd number).
 const LEVEL_BLOCKS: usize = 4;
 const LAST_LEVEL_BLOCKS: usize = 11;
-/// Lengths of blocks: 1, 1, 2, 4, 8, and as long as necessary.
+/// Levels, with blocks of 1, 1, 2, 4, 8 samples and, in the last one, as many as necessary.
 const LEVELS: usize = 6;
-/// All blocks, one per level in transit.
+/// Largest number of blocks, including one per level in transit.
 const MAX_BLOCKS: usize = (LEVELS - 1) * (LEVEL_BLOCKS + 1) + LAST_LEVEL_BLOCKS + 2;
-/// Log odds against a baseline that moves before any data: every second recording.
+/// Prior log odds against a moving baseline: 2 to 1.
 const MOVING_PRIOR_NATS: f64 = 0.7;
-/// Log odds against a step of the zero: one recording in ten.
+/// Prior log odds against a step of the zero: 10 to 1.
 const STEP_PRIOR_NATS: f64 = 2.3;
-/// Standard deviations beyond which a sample between two others is a spike of the log.
+/// Standard deviations beyond which a sample between two others is a logging spike.
 const SPIKE_SDS: f64 = 6.0;
-/// Differences before they are limited.
+/// Number of differences after which further ones are clipped.
 const MIN_DIFFERENCES: f64 = 5.0;
-/// Largest squared difference, in multiples of the mean, that informs the noise: a step is none.
+/// Clip of squared differences, in multiples of their mean, so that a step does not count as noise.
 const MAX_SQUARED_DIFFERENCE: f64 = 16.0;
 /// Largest noise correlation from sample to sample.
 const MAX_RHO: f64 = 0.98;
-/// Differences of samples that many apart inform a correlation above [`LONG_LAG_FROM`], solved for to `2^-BISECTIONS`.
+/// Lag in samples of the differences from which a correlation above [`LONG_LAG_FROM`] is solved, to `2^-BISECTIONS`.
 const LONG_LAG: usize = 8;
 const LONG_LAG_FROM: f64 = 0.5;
 const BISECTIONS: u32 = 12;
-/// Independent samples from which a baseline that moves is known.
+/// Fewest independent samples for a moving baseline.
 const MIN_INDEPENDENT: f64 = 20.0;
-/// Independent samples from which the noise is known, to a ninth of its standard deviation.
+/// Independent samples after which the noise level counts as known (relative error 1/9).
 const MIN_FOR_NOISE: f64 = 40.0;
-/// Squared correlation of time and position above which drift and line are one.
+/// Squared correlation of time and position above which drift and line are not separable.
 const INSEPARABLE: f64 = 0.99;
-/// Log odds between drift and line that name one of them.
+/// Log odds between drift and line from which the more probable one is reported.
 const NAMING_NATS: f64 = 3.0;
-/// Smallest step of the zero that is one, in standard deviations of the noise: it stands out between two samples.
+/// Smallest step of the zero in standard deviations of the noise, so that it is visible between two samples.
 const MIN_STEP_SDS: f64 = 5.0;
-/// Longest blocks between which a step is searched, in samples, and the share of the step that has to lie between them: longer
-/// ones do not tell a step from a ramp.
+/// Longest blocks between which a step is searched, in samples (longer ones do not distinguish a step from a ramp), and the smallest
+/// share of the step that lies between them.
 const MAX_JUMP_SAMPLES: f64 = 2.0;
 pub(super) const MIN_JUMP_SHARE: f64 = 0.6;
 /// Multiplications and additions of an evaluation per block.
@@ -125,7 +125,7 @@ impl AirEvidence {
     }
 }
 
-/// A baseline fitted to the samples in air. Level, drift and line belong to `time_s`, `position_m`.
+/// A baseline fitted to the samples in air, referred to `time_s` and `position_m`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BaselineFit {
     pub(crate) time_s: f64,
@@ -135,7 +135,7 @@ pub(crate) struct BaselineFit {
     /// Their covariance.
     pub(crate) p: [[f64; 3]; 3],
     pub(crate) kind: BaselineKind,
-    /// Samples that the fit rests on.
+    /// Number of samples fitted.
     pub(crate) samples: f64,
 }
 
@@ -175,25 +175,25 @@ pub(crate) struct AirHistory {
     origin: Sample,
     /// Samples taken.
     pub(super) samples: f64,
-    /// The last two samples; the last one waits to be seen between two others.
+    /// The last two samples; the newest is checked for a spike once its successor is known.
     before: [Block; 2],
     /// Mean squared differences in N² of samples one, two and [`LONG_LAG`] apart, and their numbers.
     differences: [f64; 3],
     difference_counts: [f64; 3],
-    /// The last forces in N, of which the next one overwrites the oldest.
+    /// Ring buffer of the last forces in N.
     recent_n: [f64; LONG_LAG],
     /// Lower bound on the variance of the noise in N².
     least_n2: f64,
 }
 
-/// Blocks in the order of time, and where a step or a bend may begin.
+/// Blocks in the order of time.
 struct Ordered {
     blocks: [Block; MAX_BLOCKS],
     len: usize,
 }
 
 impl AirHistory {
-    /// The noise has at least the variance `least_n2`.
+    /// Empty history; the noise variance is at least `least_n2`.
     pub(super) fn new(least_n2: f64) -> Self {
         Self {
             blocks: [[Block::default(); LAST_LEVEL_BLOCKS + 1]; LEVELS],
@@ -209,13 +209,13 @@ impl AirHistory {
         }
     }
 
-    /// Takes a sample in air.
+    /// Adds a sample in air.
     pub(super) fn push(&mut self, sample: &Sample) {
         self.take(sample, true);
     }
 
-    /// Takes a sample that may be one of the tissue, where the force changes more from sample to sample than the noise does: it does not
-    /// inform a noise that is known.
+    /// Adds a sample that may be in tissue, where the force changes by more than the noise; it does not update a noise level that is
+    /// known.
     pub(super) fn push_doubtful(&mut self, sample: &Sample) {
         let rho = self.rho();
         let is_known = self.samples * (1.0 - rho) >= MIN_FOR_NOISE * (1.0 + rho);
@@ -287,7 +287,7 @@ impl AirHistory {
                 return;
             }
             if level + 1 == LEVELS {
-                // All become longer.
+                // Full: merge pairs, which doubles the length of all blocks.
                 for pair in 0..LAST_LEVEL_BLOCKS.div_ceil(2) {
                     let [first, second] = [self.blocks[level][2 * pair], self.blocks[level][2 * pair + 1]];
                     self.blocks[level][pair] = first.merged(&second);
@@ -341,7 +341,7 @@ impl AirHistory {
         (0.5 * self.differences[0] / (1.0 - self.rho())).max(self.least_n2)
     }
 
-    /// Information in a sample about anything slow, in N⁻².
+    /// Information per sample about a slow signal in N⁻²: the inverse of the long-run noise variance.
     fn sample_weight(&self) -> f64 {
         let rho = self.rho();
         (1.0 - rho) / ((1.0 + rho) * self.noise_variance())
@@ -375,7 +375,7 @@ impl AirHistory {
         let n = at_least(2.0, self.samples);
         let half_log_n = 0.5 * libm::log(n);
         let moving = half_log_n + MOVING_PRIOR_NATS;
-        // Of the baselines that move, the better one.
+        // The better one of the moving baselines.
         let line = total.residual(Form::Line) < total.residual(Form::Drift);
         let forms = [(Form::Constant, 0.0), (if line { Form::Line } else { Form::Drift }, moving)];
         let residual = |form: Form| total.residual(form);
@@ -405,7 +405,7 @@ impl AirHistory {
                 }
             }
         }
-        // What even the best hypothesis leaves is noise.
+        // The residual of the best hypothesis is noise.
         let mut least = f64::INFINITY;
         for (k, (form, _)) in forms.iter().enumerate() {
             let gain = 2.0 * step[k].nats.max(bend[k].nats).max(0.0);
@@ -446,12 +446,12 @@ impl AirHistory {
         (at.time_s + self.origin.time_s, at.position_m + self.origin.position_m)
     }
 
-    /// The zero jumped by `size_n` with the last `count` samples.
+    /// Removes a step of the zero by `size_n` that began with the last `count` samples.
     pub(super) fn absorb_last_samples(&mut self, count: usize, size_n: f64) {
         self.absorb_step(self.ordered().len.saturating_sub(count), size_n);
     }
 
-    /// The zero jumped by `size_n` at block `from`: what came before is moved to the new zero.
+    /// Removes a step of the zero by `size_n` at block `from`: shifts earlier blocks to the new zero.
     pub(super) fn absorb_step(&mut self, from: usize, size_n: f64) {
         let mut index = 0;
         for level in (0..LEVELS).rev() {
@@ -462,7 +462,7 @@ impl AirHistory {
                 if index < from {
                     block.force_n += size_n;
                 }
-                // A block that holds both levels is worthless.
+                // Drop a block that may contain both levels.
                 if block.count > 1.0 && (index == from || index + 1 == from) {
                     block.count = 0.0;
                 }
@@ -489,8 +489,8 @@ impl AirHistory {
         fit
     }
 
-    /// Drift and line are estimated together, each with a prior of the size of the whole change, so that motion at one speed
-    /// leaves half of it to each.
+    /// Joint least-squares fit of level, drift and line. Each slope has a prior of the size of the whole change, so that at constant
+    /// speed, where both are collinear, each gets half of it.
     fn fit(&self, evidence: &AirEvidence, total: &Totals, form: Form, at: &Sample) -> BaselineFit {
         // Sums in units of the noise variance with its excess.
         let scale = 1.0 / evidence.excess;

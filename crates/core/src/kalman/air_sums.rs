@@ -132,7 +132,7 @@ impl Totals {
         }
     }
 
-    /// Sum of squares that the baseline leaves, in units of the noise variance.
+    /// Residual sum of squares of the baseline in units of the noise variance.
     pub(super) fn residual(&self, form: Form) -> f64 {
         let (square, product) = self.slope(form);
         at_least(0.0, self.ff - if square > 0.0 { product * product / square } else { 0.0 })

@@ -1,4 +1,5 @@
-//! The baseline that is followed in air, what is subtracted from the force, and the decisions on contact and steps of the zero.
+//! Baseline in air: its history, the part subtracted from the force, and the state of the decisions on contact and steps of the
+//! zero.
 
 use super::air_history::{AirHistory, BaselineFit};
 use super::gaussian::at_least;
@@ -16,13 +17,13 @@ pub(crate) struct AirBaseline {
     pub(super) subtracted_n: f64,
     pub(super) rate: [f64; 2],
     pub(super) origin: [f64; 2],
-    /// Last fit of a baseline that moves; the force in it is as measured.
+    /// Last fit of a moving baseline, to the force as measured.
     pub(super) fit: BaselineFit,
     pub(super) moving: bool,
     pub(super) next_evaluation: f64,
-    /// The contact is certain, or given.
+    /// The contact is final, or was configured.
     pub(super) settled: bool,
-    /// Force of the present sample as measured.
+    /// Measured force of the current sample in N.
     pub(super) measured_n: f64,
     pub(super) zero_steps: usize,
 }
@@ -43,7 +44,7 @@ impl AirBaseline {
         }
     }
 
-    /// What is subtracted from the force at this time and place, in N.
+    /// Baseline subtracted from the force at this time and position, in N.
     #[inline(always)]
     pub(super) fn subtracted_n(&self, time_s: f64, position_m: f64) -> f64 {
         self.subtracted_n

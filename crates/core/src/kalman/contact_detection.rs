@@ -11,9 +11,9 @@ use super::state::{FAILED_MISFIT, KalmanEnhancer, MAX_STIFFNESS_N_PER_M};
 use crate::config::{Contact, EnhanceConfig};
 use crate::sample::Sample;
 
-/// Consecutive samples above the threshold that make a contact.
+/// Consecutive samples beyond the threshold after which the hypotheses in air are evaluated.
 const CONTACT_SAMPLES: u32 = 5;
-/// Samples from which the noise is estimated where there is no air.
+/// Samples used to estimate the noise when the recording does not begin in air.
 const MIN_NOISE_SAMPLES: f64 = 40.0;
 /// Multiplications and additions of a slope with its variance, and of the bend test.
 const OPERATIONS_PER_VERIFICATION: u32 = 10 + OPERATIONS_PER_BEND_TEST;
@@ -81,7 +81,7 @@ impl KalmanEnhancer {
         }
     }
 
-    /// Contact at a given surface, with the baseline that was followed so far.
+    /// Starts the contact at a configured surface, with the present baseline.
     #[cold]
     fn start_known_contact(
         &mut self,
@@ -97,7 +97,7 @@ impl KalmanEnhancer {
         }
     }
 
-    /// The recording begins in the tissue: the noise is known from differences, the zero is that of the sensor.
+    /// Starts a recording that begins in tissue: the noise is estimated from differences, the bias is zero.
     fn start_without_air(&mut self, config: &EnhanceConfig, step: &MotionStep, sample: &Sample) {
         let history = &self.baseline.history;
         if history.samples < MIN_NOISE_SAMPLES {
@@ -146,7 +146,8 @@ impl KalmanEnhancer {
         }
     }
 
-    /// Contact at `start_m`, with `force_n` acting at the sample, known to `sd_n`.
+    /// Initialises all filters for a contact at `start_m`, with a force `force_n` (standard deviation `sd_n`) acting at the
+    /// sample.
     #[cold]
     pub(super) fn start_contact(
         &mut self,

@@ -147,7 +147,7 @@ impl ForcePredictor {
         self.unpaired = true;
     }
 
-    /// All forces from here on are `by_n` larger.
+    /// Shifts the level because all later forces are larger by `by_n`.
     pub(super) fn shift_level(&mut self, by_n: f64) {
         self.belief.x[L] += by_n;
         self.unpaired = true;

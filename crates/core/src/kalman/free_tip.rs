@@ -1,5 +1,5 @@
-//! Detection of a free tip. A layer that ruptures before its far face leaves a gap: until the next face, or for ever behind
-//! the last layer, nothing acts at the tip and the whole force is friction.
+//! Detection of a free tip. A layer that ruptures before its far face leaves a gap: until the next face, or permanently
+//! behind the last layer, no force acts at the tip and the whole force is friction.
 //!
 //! After a rupture the estimator assumes that the next layer begins at once. Two alternatives are nested in its law:
 //!
@@ -11,8 +11,8 @@
 //! The Bayes factor of each is the density of the state at that point over its density when the layer began (Savage-Dickey
 //! ratio: Dickey 1971, Ann. Math. Statist. 42, 204), so that no second filter is needed. At odds of [`ODDS`] the state is
 //! conditioned on the hypothesis. The gap ends with a bend of the force, detected by the CUSUMs: upwards at a face, where a
-//! layer begins; downwards at the far face of the previous layer, where friction stops growing. While the odds are open only
-//! upward bends count: the law of a layer is straight, and a fall may be its rupture.
+//! layer begins; downwards at the far face of the previous layer, where friction stops growing. While the odds are undecided
+//! only upward bends count: the loading curve of a layer is straight, and a drop may be its rupture.
 
 use super::cusum::CusumBank;
 use super::gaussian::at_least;
@@ -21,11 +21,11 @@ use super::noise_estimator::NoiseEstimator;
 
 /// Odds at which the tip is taken to be free.
 const ODDS: f64 = 20.0;
-/// Shift of the slow sum that dates the start of a bend, in standard deviations of an innovation.
+/// Shift of the slow sum that locates the start of a bend, in standard deviations of an innovation.
 const SLOW_SHIFT: f64 = 0.5;
 /// Limit on log odds, in nats.
 const MAX_LOG_ODDS_NATS: f64 = 500.0;
-/// Power of [`ODDS`] against a free tip at which a layer is certain: weak layers look like a free tip at first.
+/// A layer is confirmed at [`ODDS`] to this power against a free tip: soft layers look like a free tip at first.
 const CONFIRMATION_POWER: f64 = 4.0;
 /// Fraction of a variance that remains after conditioning.
 const CONDITIONED_VARIANCE_FRACTION: f64 = 1e-9;
@@ -59,7 +59,7 @@ impl BendDetector {
         self.slow = 0.0;
     }
 
-    /// Takes an innovation of which negative values count; true when the force has bent.
+    /// Adds an innovation, of which negative values count; true when the force has bent.
     #[inline(always)]
     fn update(&mut self, z: f64, estimator: &LayerEstimator, last_m: f64) -> bool {
         let next = at_least(0.0, self.slow + SLOW_SHIFT * (-z - 0.5 * SLOW_SHIFT));
@@ -89,7 +89,7 @@ impl FreeTipDetector {
         (self.up.snapshot, self.down.snapshot) = (*estimator, *estimator);
     }
 
-    /// There is no sign of an upward bend.
+    /// True while the slow upward sum is zero: no sign of a bend.
     pub(super) fn is_straight(&self) -> bool {
         self.up.slow == 0.0
     }
@@ -134,7 +134,7 @@ impl FreeTipDetector {
         let (span_m, at_m) = ((position_m - side.snapshot_m).max(0.0), side.snapshot_m);
         *estimator = side.snapshot;
         if span_m == 0.0 {
-            // No layer begins while the needle stands: the tip was loaded before.
+            // No layer begins while the needle stands still: the tip was loaded before.
             if estimator.tip_free {
                 estimator.reopen_split(drive, 1.0 / noise.variance);
             }
@@ -142,7 +142,7 @@ impl FreeTipDetector {
             return (operations, true);
         }
         if !estimator.tip_free {
-            // The law of a layer is straight: there was none, whatever friction did.
+            // The loading curve of a layer is straight, so there was no layer before the bend.
             estimator.set_zero_stiffness();
         }
         estimator.start_after_bend(at_m, span_m / libm::sqrt(12.0), bent_up, drive, noise, passed_layers);

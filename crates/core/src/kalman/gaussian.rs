@@ -1,5 +1,4 @@
-//! Gaussian state of a few unknowns with scalar measurement updates: the Kalman filter that predictor and layer estimator
-//! share.
+//! Kalman filter for a few unknowns with scalar measurements, shared by force predictor and layer estimator.
 #![allow(clippy::needless_range_loop, reason = "matrices read best with their indices")]
 
 /// Mean and covariance of `N` unknowns. Only the lower triangle of the covariance is kept, in units of a noise variance

@@ -8,7 +8,7 @@
 //! f = f0 + p + q u + K x + b x u      first layer: p, q = K, b times the depth at which contact was detected
 //! ```
 //!
-//! and, where the force moved in air, `d t + g z` since contact: what the subtracted drift and line still lack.
+//! With a moving baseline, `d t + g z` (since contact) is added: the error of the drift and line already subtracted.
 //!
 //! (`p` and `q` take the places of `D` and `K'`.) `f0` is the sensor bias, with a prior from the samples in air. At a
 //! rupture after a travel `d` the friction becomes `D + b d` (`q + b d` in the first layer) and the ruptured layer's `K, b`
@@ -43,11 +43,11 @@ pub(crate) struct LayerEstimator {
     /// Ruptures so far.
     pub(crate) passed_count: usize,
     pub(crate) previous_thickness_m: f64,
-    /// The tip is in a gap or beyond the last layer: what grows with travel is friction.
+    /// The tip is in a gap or beyond the last layer: a force that grows with travel is friction.
     pub(super) tip_free: bool,
     /// Log densities of the two free-tip hypotheses when the active layer began, see [`super::free_tip`].
     pub(super) initial_log_densities: [f64; 2],
-    /// A layer has certainly begun.
+    /// The data confirm that a layer has begun.
     pub(super) layer_confirmed: bool,
     /// Place of the last rupture in m and its standard deviation.
     pub(super) rupture_m: f64,
@@ -70,12 +70,12 @@ pub(crate) struct LayerEstimator {
     pub(super) elapsed_s: f64,
 }
 
-/// Start, end and friction per metre of the passed layers, each as it was known at the next rupture.
+/// Start, end and friction per metre of each passed layer, as estimated at the rupture after it.
 pub(crate) type PassedLayers = [[f64; 3]; MAX_LAYERS];
 
 impl LayerEstimator {
-    /// Contact at `start_m`. A force `force_n` with standard deviation `sd_n` acts already; stiffness and friction are
-    /// unknown on the scale of `slope` N/m.
+    /// Initial state at a contact at `start_m`, where a force `force_n` with standard deviation `sd_n` acts; `slope` in N/m is the
+    /// scale of the priors of stiffness and friction.
     pub(crate) fn at_contact(
         start_m: f64,
         force_n: f64,
@@ -123,7 +123,7 @@ impl LayerEstimator {
         }
     }
 
-    /// The baseline moved in air: its drift and line, subtracted from the force from here on, are uncertain as in `fit`.
+    /// Makes drift and line unknowns, with the covariance of `fit`; their fitted values are subtracted from the force from here on.
     pub(super) fn set_baseline(&mut self, fit: &BaselineFit, noise: &NoiseEstimator) {
         let unit = 1.0 / noise.variance;
         let g = &mut self.belief;
@@ -138,12 +138,12 @@ impl LayerEstimator {
         self.moving_baseline = true;
     }
 
-    /// The zero is uncertain by a further variance in N².
+    /// Adds a variance in N² to the sensor bias.
     pub(super) fn widen_bias(&mut self, variance: f64, noise: &NoiseEstimator) {
         self.belief.p[BIAS][BIAS] += variance / noise.variance;
     }
 
-    /// Drift and line that the force still holds at a position, in N, and their variance in N²; `None` with a constant baseline.
+    /// Error of the subtracted drift and line at a position, in N, and its variance in N²; `None` with a constant baseline.
     #[inline(always)]
     pub(super) fn baseline_residual_n(&self, position_m: f64, noise: &NoiseEstimator) -> Option<(f64, f64)> {
         if !self.moving_baseline {
@@ -167,7 +167,7 @@ impl LayerEstimator {
         if self.moving_baseline { 2 * (512 - 216) + 2 * (288 - 126) } else { 0 }
     }
 
-    /// What the subtracted drift and line lack, and standard deviations.
+    /// Corrections of the subtracted drift (N/s) and line (N/m), and their standard deviations.
     pub(super) fn baseline_residual(&self, noise: &NoiseEstimator) -> ([f64; 2], [f64; 2]) {
         let g = &self.belief;
         let sd = |i: usize| libm::sqrt(at_least(0.0, g.p[i][i]) * noise.variance);
@@ -186,7 +186,7 @@ impl LayerEstimator {
         [a, x, x * drive, q, 0.0, 1.0, elapsed_s, x + (self.start_m - self.contact_m)]
     }
 
-    /// Total friction per drive, that of the active layer included.
+    /// Total friction per unit of drive, including the active layer.
     pub(crate) fn friction(&self, position_m: f64) -> f64 {
         let passed = self.belief.x[if self.passed_count > 0 { D } else { K_PREV }];
         passed + self.belief.x[B] * (position_m - self.start_m)
@@ -199,7 +199,7 @@ impl LayerEstimator {
         w.iter().zip(&self.belief.x).map(|(w, x)| w * x).sum()
     }
 
-    /// Takes a sample; returns the innovation in N and its variance in units of the noise variance.
+    /// Measurement update; returns the innovation in N and its variance in units of the noise variance.
     #[inline(always)]
     pub(crate) fn update(&mut self, position_m: f64, drive: f64, force_n: f64, rho: f64) -> (f64, f64) {
         let innovation = self.innovation(position_m, drive, force_n, rho);
@@ -234,7 +234,7 @@ impl LayerEstimator {
         }
     }
 
-    /// Takes the sample of a [`LayerEstimator::innovation`].
+    /// Measurement update with the innovation of [`LayerEstimator::innovation`].
     #[inline(always)]
     pub(crate) fn apply(
         &mut self,
@@ -261,8 +261,8 @@ impl LayerEstimator {
         self.belief.x[K] + self.belief.x[B] * drive
     }
 
-    /// Nats against a stiffness and a friction coefficient below zero, of this layer and the one before: about minus the logarithm of
-    /// the probability that they are positive.
+    /// Penalty in nats for negative stiffness or friction of the active and the previous layer: about minus the log probability that
+    /// they are positive.
     pub(super) fn negative_nats(&self, noise: &NoiseEstimator) -> f64 {
         let g = &self.belief;
         let one = |i: usize| {
@@ -280,7 +280,7 @@ impl LayerEstimator {
         (self.slope(drive), libm::sqrt(at_least(0.0, variance) * noise.variance))
     }
 
-    /// A rupture at `position_m` with standard deviation `sd_m`.
+    /// Transforms the state at a rupture at `position_m` with standard deviation `sd_m`.
     pub(crate) fn rupture(
         &mut self,
         position_m: f64,
@@ -324,14 +324,14 @@ impl LayerEstimator {
         }
         self.transform(&map);
         if self.start_sd_m > 0.0 {
-            // A misplaced start of the ruptured layer looked like a change of the bias.
+            // The bias estimate has absorbed the error in the ruptured layer's start.
             self.belief.reset_component(BIAS, noise.bias_n(), noise.bias_variance() * unit);
         }
         self.start_layer(slope, sd_m, (stiffness, b), drive, unit);
         (self.previous_start_sd_m, self.start_sd_m, self.gap_m) = (self.start_sd_m, 0.0, 0.0);
         self.gap_sd_m = 0.0;
         d += depth_at_contact;
-        // The layer before the ruptured one gets no more information.
+        // Later samples do not inform the layer before the ruptured one: store its friction.
         if let Some(before) = self.passed_count.checked_sub(1).and_then(|i| passed_layers.get_mut(i)) {
             before[2] = ruptured_friction;
         }
@@ -347,7 +347,7 @@ impl LayerEstimator {
             [self.log_density_of_free(true, noise), self.log_density_of_free(false, noise)];
     }
 
-    /// A tip taken to be free has lost force, so that there was a layer: any part of the slope may have been elastic.
+    /// Reverts the free-tip assumption after a drop: moves half of the slope, with that sd, from friction to stiffness.
     pub(super) fn reopen_split(&mut self, drive: f64, unit: f64) {
         let widest = max_slope(unit);
         let half = (0.5 * self.slope(drive)).clamp(-widest, widest);

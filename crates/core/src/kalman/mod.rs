@@ -1,5 +1,5 @@
-//! [`Algorithm::Stylet`](crate::config::Algorithm::Stylet): Kalman filters for the next force and for the layers, CUSUM
-//! rupture alarm, one pass, bounded work per sample. Derivation: `docs/explanation/enhancer.md`.
+//! [`Algorithm::Stylet`](crate::config::Algorithm::Stylet): Kalman filters for the one-step force prediction and for the
+//! layer parameters, CUSUM rupture alarm; one pass, bounded work per sample. Derivation: `docs/explanation/enhancer.md`.
 
 mod air_decisions;
 mod air_history;
@@ -32,7 +32,7 @@ use crate::config::EnhanceConfig;
 use crate::sample::{Output, Sample, UnusedReason};
 pub(crate) use state::KalmanEnhancer;
 
-/// Multiplications and additions of every sample outside the filters.
+/// Multiplications and additions per sample outside the filters.
 const OPERATIONS_PER_SAMPLE: u32 = 60;
 /// Speeds in m/s and positions in m beyond these are logging errors.
 const MAX_SPEED_MPS: f64 = 2.0;
@@ -43,7 +43,8 @@ const MIN_DUPLICATE_INTERVAL_S: f64 = 1e-6;
 const MAX_DUPLICATE_INTERVAL_S: f64 = 1e-4;
 
 impl KalmanEnhancer {
-    /// Values that a needle can have; speed and position limits are tighter than those of [`Sample::is_usable`].
+    /// True if the values are possible for a needle; the limits on speed and position are tighter than in
+    /// [`Sample::is_usable`].
     #[inline(always)]
     pub(crate) fn is_usable(sample: &Sample) -> bool {
         let in_range = sample.velocity_mps.abs() < MAX_SPEED_MPS && sample.position_m.abs() < MAX_POSITION_M;
@@ -65,7 +66,7 @@ impl KalmanEnhancer {
         self.output.zero_step = None;
         self.output.restarted = false;
         self.operations = OPERATIONS_PER_SAMPLE;
-        // Two samples at almost the same time say nothing about the velocity.
+        // Two samples at almost the same time carry no information about the velocity.
         let min_interval_s = (DUPLICATE_INTERVAL_FRACTION * self.noise.interval_s)
             .clamp(MIN_DUPLICATE_INTERVAL_S, MAX_DUPLICATE_INTERVAL_S);
         let later = sample.time_s - self.last_sample.time_s > min_interval_s;

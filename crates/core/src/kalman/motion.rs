@@ -53,8 +53,8 @@ impl KalmanEnhancer {
         self.steady_drive_mps = step.speed_mps + dry_mps;
     }
 
-    /// A needle logged as moving whose position has not changed: is the log accurate or smoothed? Friction appears together
-    /// with the velocity, so the force decides.
+    /// Resolves a nonzero logged velocity at an unchanged position. If the force has jumped by the friction of that
+    /// velocity, the log is right; otherwise it is smoothed and the needle rests.
     #[inline(always)]
     pub(super) fn resolve_motion_start(
         &self,

@@ -3,11 +3,11 @@
 
 use super::gaussian::{at_least, at_most};
 
-/// Longest memory in the tissue, in samples: 3 % of `sigma`, so that the false-alarm rate is right within a factor of two.
+/// Longest memory in tissue, in samples: `sigma` to within 3 %, and so the false-alarm rate to within a factor of two.
 const MEMORY_SAMPLES: f64 = 2000.0;
 /// Largest lag-one correlation.
 const MAX_RHO: f64 = 0.98;
-/// Largest squared standardised innovation that counts: one event carries little information about the noise.
+/// Clip of squared standardised innovations, so that single events do not bias the noise level.
 const MAX_SQUARED_INNOVATION: f64 = 16.0;
 /// Samples in air before the first estimate.
 const MIN_AIR_SAMPLES: f64 = 40.0;
@@ -22,10 +22,10 @@ pub(crate) struct NoiseEstimator {
     pub(crate) variance: f64,
     /// Usual sampling interval in s.
     pub(crate) interval_s: f64,
-    /// Samples that the estimate rests on.
+    /// Number of samples of the estimate.
     pub(crate) sample_count: f64,
     first_n: f64,
-    /// Sums of `f`, `f²`, `f_k f_(k-1)` and 1 over the samples in air that count, wait, and come in.
+    /// Sums of `f`, `f²`, `f_k f_(k-1)` and 1 over the samples in air: accepted, waiting, incoming.
     sums: [f64; 4],
     waiting: [f64; 4],
     incoming: [f64; 4],
@@ -85,8 +85,8 @@ impl NoiseEstimator {
         }
     }
 
-    /// Starts again from a mean force in air known from `count` samples with this marginal variance and correlation; the last
-    /// force was `last_n`.
+    /// Re-initialises from the mean of `count` samples in air, their marginal variance and correlation, and the last force
+    /// `last_n`.
     #[cold]
     pub(crate) fn restart_in_air(&mut self, mean_n: f64, variance: f64, rho: f64, count: f64, last_n: f64) {
         self.first_n = mean_n;
@@ -105,8 +105,8 @@ impl NoiseEstimator {
         self.min_variance
     }
 
-    /// Takes a sample in air. Samples count only when at least twice as many have followed without a contact, so that a
-    /// slowly rising load is not learned as noise.
+    /// Adds a sample in air. Samples are accepted only when at least twice as many have followed without a contact, so that
+    /// a slowly rising load is not learned as noise.
     pub(crate) fn update_in_air(&mut self, force_n: f64) {
         if self.sums[3] + self.incoming[3] == 0.0 {
             self.first_n = force_n;
@@ -163,7 +163,7 @@ impl NoiseEstimator {
         }
     }
 
-    /// Takes a whitened innovation `e` whose variance is `s` times the noise variance.
+    /// Updates the noise with a whitened innovation `e`, whose variance is `s` times the noise variance.
     #[inline(always)]
     pub(crate) fn update_in_tissue(&mut self, e: f64, s: f64) {
         let z2 = e * e / (s * self.variance);

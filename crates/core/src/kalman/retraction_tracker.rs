@@ -89,10 +89,10 @@ impl RetractionTracker {
 /// Friction along the shaft from an identified model.
 ///
 /// During insertion the model's friction is used, limited to between zero and the force. During retraction a tracker corrects
-/// it, starting from the difference between force and model before the turn, all of which is friction. What such a model
-/// misses are presliding features of the wrong size or in the wrong place, so the tracker's memory is as long as those.
-/// Releases of the shaft differ in place between insertions; the model's release is therefore withheld until the force shows
-/// one, because a release at the wrong place would look like a tip force.
+/// it, starting from the difference between force and model before the turn, all of which is friction. Typical model errors
+/// are presliding features of wrong size or position, so the tracker's memory is the presliding travel. Releases of the shaft
+/// differ in place between insertions; the model's release is therefore withheld until the force shows one, because a release
+/// at the wrong place would look like a tip force.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct ModelFriction {
     /// Where retraction began, and the correction since.

@@ -1,4 +1,4 @@
-//! Drop candidates: whether a fall of the force is a rupture, and what a rupture changes.
+//! Rupture detection: tracks force drops, tests them against noise and texture, and updates all filters at a rupture.
 
 use super::force_predictor::{MEMORY_M, MotionStep};
 use super::gaussian::{at_least, at_most};
@@ -9,13 +9,13 @@ use crate::sample::{Cause, Detection, Sample};
 
 /// Samples that the level of a candidate is averaged over at most.
 const MAX_AVERAGED_SAMPLES: f64 = 16.0;
-/// Size of a drop in standard deviations below the base law where that holds: exceeded by noise once in 30 000 looks.
+/// Size of a drop in standard deviations below the base law where that holds: exceeded by noise once in 30 000 tests.
 pub(super) const SURE_DROP_SDS: f64 = 4.0;
-/// Size of a drop where the base law has failed: larger than its own interval.
+/// Size of a drop in standard deviations where the base law is rejected: outside its 95 % interval.
 const LIKELY_DROP_SDS: f64 = 2.0;
-/// Squared number of standard deviations within which two lines lead to the same place.
+/// Squared distance in variances within which two estimates of a drop's onset agree.
 const SAME_LINE_SDS_SQUARED: f64 = 16.0;
-/// Smallest variance of a place, that of a micrometre, in m².
+/// Smallest variance of a position in m²: (1 µm)².
 const MIN_PLACE_VARIANCE_M2: f64 = 1e-12;
 
 /// Size of a candidate, its standard deviation, and the smallest size that is a rupture, in N.
@@ -26,7 +26,7 @@ struct DropSize {
 }
 
 impl KalmanEnhancer {
-    /// Follows a fall from its start; a sample that outweighs the history restarts it.
+    /// Tracks a drop from its start; a sample that outweighs the accumulated sums restarts it.
     #[inline(always)]
     pub(super) fn track_candidate(&mut self, step: &MotionStep, sample: &Sample, outweighs_history: bool) {
         if outweighs_history {
@@ -67,9 +67,9 @@ impl KalmanEnhancer {
         }
     }
 
-    /// Whether the candidate exceeds noise and texture.
+    /// True if the candidate exceeds noise and texture.
     pub(super) fn is_rupture(&mut self, config: &EnhanceConfig) -> bool {
-        // Until the base law has been confirmed, the first travel after contact is no layer.
+        // Until the base law is confirmed, no rupture is declared in the first travel after contact.
         if self.misfit_weight > 0.0 && self.deepest_m - self.contact_sample_m < config.guard.blind_travel_m {
             return false;
         }
@@ -100,19 +100,19 @@ impl KalmanEnhancer {
         Some(DropSize { fall_n: at_most(candidate.missing_n, fallen_n), sd_n, min_n: sure_n })
     }
 
-    /// Discards what has accumulated.
+    /// Resets the CUSUMs and the drop candidate.
     #[inline(always)]
     pub(super) fn reset_detector(&mut self) {
         self.cusum.reset();
         (self.candidate, self.cusum_was_zero) = (None, true);
     }
 
-    /// A further alarm within the duration of the same drop.
+    /// Handles a further alarm within the duration of the same drop.
     pub(super) fn continue_drop(&mut self, step: &MotionStep, sample: &Sample, sd: f64) {
         let force = (sample.force_n - self.noise.bias_n()).abs().max(sd);
         self.predictor.restart(sample.force_n, force, &self.noise, step.speed_mps, false);
         self.reset_detector();
-        // The zero does not go on falling.
+        // A step of the zero does not continue, so this is a rupture.
         self.rival = None;
         if let Some(post_rupture) = self.post_rupture {
             self.estimator = post_rupture;
@@ -178,7 +178,7 @@ impl KalmanEnhancer {
         });
     }
 
-    /// Whether the force is still falling after a rupture. The end of the drop settles its place.
+    /// True while the force is still falling after a rupture. At the end of a long drop the rupture's position is revised.
     pub(super) fn drop_is_ongoing(&mut self, step: &MotionStep, sample: &Sample) -> bool {
         // Acceleration from the lag of the low-passed speed.
         let accel_mps2 = (sample.velocity_mps - step.speed_mps) / SPEED_TIME_CONSTANT_S;
@@ -188,7 +188,7 @@ impl KalmanEnhancer {
         let falling = rate < -3.0 * sd;
         self.time_since_falling_s = if falling { 0.0 } else { self.time_since_falling_s + step.dt_s };
         if self.drop_continues && !falling {
-            // The slope of the fall is not that of what follows.
+            // The slope of the drop does not apply after it.
             let force = (sample.force_n - self.noise.bias_n()).abs().max(sd * step.dt_s);
             self.predictor.restart(sample.force_n, force, &self.noise, step.speed_mps, false);
         }
@@ -217,7 +217,7 @@ impl KalmanEnhancer {
             level * noise_n2 + back_s * (back_s * sd_n_per_s * sd_n_per_s - 2.0 * covariance * noise_n2);
         let variance = at_least(MIN_PLACE_VARIANCE_M2, line_n2 / (steepness * steepness));
         let onset_m = sample.position_m - back_m;
-        // A line that leads elsewhere is no longer that of the fall.
+        // A line with another onset no longer describes the drop.
         let same_line = self.drop_onset.is_none_or(|(best_m, best)| {
             let off_m = onset_m - best_m;
             variance < best && off_m * off_m < SAME_LINE_SDS_SQUARED * best

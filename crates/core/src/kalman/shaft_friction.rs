@@ -1,13 +1,13 @@
 //! Shaft friction where the base law does not hold: dry, building up over travel, persisting in holds.
 //!
-//! Measured insertions do not follow `f = D v + K x + b x v`: friction hardly depends on speed, and loading is curved. What
-//! can be stated without a law:
+//! Measured insertions do not follow `f = D v + K x + b x v`: friction hardly depends on speed, and loading is curved.
+//! Without a friction law, the following still holds:
 //!
 //! - Just after a rupture nothing acts at the tip. Over [`MEMORY_M`] of travel, in which friction builds up again after the
 //!   slip, the whole force is friction.
 //! - While the needle advances, the elastic force of an intact layer does not fall. A slowly falling force is falling
 //!   friction, and friction never exceeds the force.
-//! - In a hold tip force and friction relax and are not separable: their ratio stays.
+//! - In a hold tip force and friction relax and are not separable: their ratio is kept.
 //! - During retraction nothing acts at the tip unless it is caught: friction goes from the force of the hold through zero to
 //!   a pull, `P(x) = -S + (F + S) exp(-x/delta)`. `S` and `delta` cannot be learned during insertion; [`PULL_FRACTION`] and
 //!   [`PRESLIDING_TRAVEL_M`] are prior means, which the tracker corrects.
@@ -119,8 +119,8 @@ impl Retraction {
         if sample.track_retraction {
             return self.tracker.update(sample, travel, predicted);
         }
-        // No tip pushes during retraction: friction pulls no more than the force does, and less than predicted for a while
-        // afterwards.
+        // The tip cannot push during retraction: friction pulls at most as much as the force, and less than predicted for a
+        // while afterwards.
         self.reduction_n =
             (self.reduction_n * libm::exp(-travel / TRACKING_TRAVEL_M)).max(smoothed_n - predicted);
         (predicted + self.reduction_n, 0.25 * sample.peak_force_n)

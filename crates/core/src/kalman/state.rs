@@ -12,16 +12,16 @@ use super::zero_step_state::{Jump, Rival};
 use crate::config::EnhanceConfig;
 use crate::sample::{Output, Sample};
 
-/// Misfit up to which the layer estimator feeds the alarm. If all the excess over one were a constant offset, of 0.45 standard
-/// deviations, the CUSUMs would not drift.
+/// Largest misfit (mean squared standardised innovation) at which the layer estimator feeds the CUSUMs. Even if its excess
+/// over 1 is a constant offset, 0.45 standard deviations, they do not drift.
 pub(super) const MAX_ALARM_MISFIT: f64 = 1.2;
-/// Stiffest tissue, in N/m: prior width of an unknown slope.
+/// Prior standard deviation of an unknown slope in N/m: that of the stiffest tissue.
 pub(super) const MAX_STIFFNESS_N_PER_M: f64 = 2000.0;
 /// Multiplications and additions of a rupture (linear maps of six and five unknowns).
 pub(super) const OPERATIONS_PER_RUPTURE: u32 = 2 * 216 + 2 * 126 + 2 * 84;
 /// Longest duration of an ordinary drop, in s.
 pub(super) const MAX_DROP_DURATION_S: f64 = 0.1;
-/// Misfit at which the base law has failed; the initial value, so that the law has to prove itself.
+/// Misfit from which the base law is rejected; also the initial value, so that the law is used only after it has fitted data.
 pub(super) const FAILED_MISFIT: f64 = 3.0;
 
 #[derive(Clone, Copy, Debug)]
@@ -52,18 +52,18 @@ pub(crate) struct KalmanEnhancer {
     pub(super) low_passed_n: f64,
     pub(super) samples_above_threshold: u32,
     pub(super) samples_below_threshold: u32,
-    /// Count of samples away from the baseline at which the air is looked at next.
+    /// Number of consecutive samples off the baseline at which the hypotheses in air are evaluated next.
     pub(super) next_look_at: u32,
     pub(super) baseline: AirBaseline,
-    /// The contact was given and is not revised.
+    /// The contact was configured, not detected, and is not revised.
     pub(super) contact_given: bool,
     pub(super) spike_samples: u8,
     pub(super) jump: Jump,
-    /// The last rupture, as a step of the zero.
+    /// The last rupture explained as a step of the sensor's zero instead.
     pub(super) rival: Option<Rival>,
     /// The decision on the last sample, far from the prediction, waits for the next: the velocity may have jumped.
     pub(super) deferred: bool,
-    /// Where a rupture was not declared, because the needle may have stopped there.
+    /// Position in m of an alarm that was not declared because the needle may have stopped there.
     pub(super) waiting_from_m: Option<f64>,
     /// Samples since the last rupture, and the count at which the ruptured layer is reported next.
     pub(super) samples_since_rupture: u32,
@@ -83,7 +83,7 @@ pub(crate) struct KalmanEnhancer {
     pub(super) last_drop_n: (f64, f64),
     pub(super) level_before_fall_n: f64,
     pub(super) dry_friction: DryShaftFriction,
-    /// The base law has failed: friction is taken as dry.
+    /// The base law is rejected; friction is modelled as dry.
     pub(super) base_law_failed: bool,
     pub(super) release_window_s: f64,
     /// Largest smoothed force so far in N.
@@ -101,7 +101,7 @@ pub(crate) struct KalmanEnhancer {
     pub(super) output: Output,
 }
 
-/// A fall of the force that may be a rupture.
+/// A drop of the force that may be a rupture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct DropCandidate {
     pub(super) from_n: f64,

@@ -1,4 +1,4 @@
-//! A sample in the tissue: prediction, spike and rupture tests, and the updates of predictor, layer estimator and noise.
+//! Processing of a sample in tissue: prediction, spike and rupture tests, updates of predictor, layer estimator and noise.
 
 use super::force_predictor::{self, ForcePredictor, MotionStep};
 use super::gaussian::{at_least, at_most};
@@ -19,7 +19,7 @@ const OPERATIONS_PER_PREDICTION: u32 = 5 * 14 + 2 * 24 + 2 * 20;
 /// Of the layer estimator: an innovation, and an update of six unknowns.
 const OPERATIONS_PER_LAYER_INNOVATION: u32 = 2 * 35;
 const OPERATIONS_PER_LAYER_UPDATE: u32 = 2 * 27 + 12;
-/// Relative deviation from the usual speed up to which it does.
+/// Largest relative deviation from the usual speed at which the layer estimator feeds the CUSUMs.
 const MAX_SPEED_DEVIATION: f64 = 0.05;
 /// Limits on squared standardised innovations, so that one sample does not dominate a mean.
 const MAX_SQUARED_PREDICTION_ERROR: f64 = 36.0;
@@ -57,7 +57,7 @@ impl KalmanEnhancer {
             self.deepest_m = sample.position_m;
         }
         let travel_gain = step.dz_m.abs() / (step.dz_m.abs() + 2.0 * force_predictor::MEMORY_M);
-        // A spike goes up, or below what any rupture leaves, and is short.
+        // A spike is short and goes up, or below the lowest force that a rupture may leave.
         let outlier = z > SPIKE_SDS || (forward && z < -SPIKE_SDS && self.is_below_ruptures(sample));
         // A release of the shaft lasts as long as a drop.
         self.release_window_s =
@@ -73,7 +73,7 @@ impl KalmanEnhancer {
             return;
         }
         if outlier {
-            // It persists: the force has jumped.
+            // Longer than a spike: the force has jumped.
             let force = (force_n - self.noise.bias_n()).abs();
             self.predictor.restart(force_n, force.max(sd), &self.noise, step.speed_mps, false);
         }
@@ -144,7 +144,7 @@ impl KalmanEnhancer {
         }
     }
 
-    /// Updates the layer estimator and how well the base law holds.
+    /// Updates the layer estimator and the misfit of the base law.
     #[inline(always)]
     fn update_layers(
         &mut self,
@@ -184,22 +184,22 @@ impl KalmanEnhancer {
             );
             self.operations += operations;
             if bent {
-                // What the predictor has missed since was the bend.
+                // The bend explains the innovations accumulated so far.
                 self.reset_detector();
             }
         }
-        // A force that the estimator could not predict does not count against the law, except in a hold.
+        // Samples with a wide prediction interval do not count towards the misfit, except in a hold.
         if s < 2.0 || sample.velocity_mps.abs() <= config.drop.standstill_mps {
             let hold_gain = at_most(0.5, step.dt_s * (0.25 / force_predictor::MEMORY_S));
             self.misfit +=
                 at_least(travel_gain, hold_gain) * (at_most(MAX_SQUARED_LAYER_ERROR, z * z) - self.misfit);
         }
         self.peak_force_n = at_least(self.peak_force_n, self.predictor.level_n() - self.noise.bias_n());
-        // Where the base law does not hold, small falls are texture.
+        // Where the base law does not hold, small drops are texture.
         let weight = (self.misfit - 0.5 * FAILED_MISFIT) / (FAILED_MISFIT - 0.5 * FAILED_MISFIT - 1.0);
         let weight = at_most(1.0, at_least(0.0, weight));
         self.misfit_weight = weight;
-        // Once failed, the law is not used again.
+        // A rejected law is not used again.
         if self.misfit >= FAILED_MISFIT
             && self.deepest_m - self.contact_sample_m >= config.guard.blind_travel_m
         {
@@ -208,15 +208,15 @@ impl KalmanEnhancer {
         self.min_drop_n = weight * config.stylet.min_drop_share * self.peak_force_n;
     }
 
-    /// The force lies below what any rupture leaves.
+    /// True if the force is below the lowest one that a rupture may leave.
     #[cold]
     fn is_below_ruptures(&self, sample: &Sample) -> bool {
         let margin_n = SPIKE_SDS * libm::sqrt(self.noise.marginal_variance());
         sample.force_n - self.lowest_after_rupture_n(sample.position_m) < -margin_n
     }
 
-    /// The force has fallen by no more than the friction along the shaft, and the needle may have stopped: since `waiting_from_m` no
-    /// position has shown that it goes on.
+    /// True if the needle may have stopped: the force has dropped by no more than the shaft friction, and no position since
+    /// `waiting_from_m` shows further motion.
     #[cold]
     fn may_be_a_stop(&self, sample: &Sample, waiting_from_m: Option<f64>) -> bool {
         let shown_m = 2.0 * self.velocity_estimator.encoder_step_m();

@@ -5,19 +5,19 @@
 //! encoder noise, `sqrt(2) sigma/dt`. The logged velocity is used as long as it agrees with `w` within four times their
 //! usual difference, and within the step of the encoder, which is the smallest change of the travel from step to step.
 //!
-//! The second difference of `w` is free of smooth motion; encoder noise gives it the variance `20 sigma²/dt²`, so that a
-//! tenth of its mean square is the noise variance of `w`. `w` extrapolated by half a step is the velocity at the sample,
-//! with variance `6.5 sigma²/dt²`. Where that is as accurate as a good log and the log has been found to be smoothed,
-//! positions alone are used from then on; a velocity jump is a second difference that stands out.
+//! The second difference of `w` is free of smooth motion; encoder noise gives it the variance `20 sigma²/dt²`, so that a tenth of its
+//! mean square is the noise variance of `w`. `w` extrapolated by half a step is the velocity at the sample, with variance
+//! `6.5 sigma²/dt²`. Where that is as accurate as a good log and the log has been found to be smoothed, positions alone are used from
+//! then on; a velocity jump is a second difference that is significant.
 
 use super::gaussian::{at_least, at_most};
 use crate::sample::Sample;
 
-/// Squared number of standard deviations that make a disagreement.
+/// Squared difference in variances from which log and positions disagree.
 const DISAGREEMENT_SDS_SQUARED: f64 = 16.0;
 /// Smallest standard deviation of the difference as a fraction of the speed: resolution and synchronisation of a good log.
 const MIN_SD_FRACTION: f64 = 0.005;
-/// Time constant of the usual difference, in s: much longer than smoothing or a lag, so that these do not become usual.
+/// Time constant of the usual difference, in s: much longer than smoothing or a lag, so that these are not learned as usual.
 pub(crate) const DISAGREEMENT_MEMORY_S: f64 = 2.0;
 
 /// Below this speed the needle is at rest, in m/s.
@@ -28,8 +28,8 @@ pub(crate) const REST_SPEED_MPS: f64 = 1e-5;
 const STEP_NOISE_RATIO: f64 = 0.1;
 const EXTRAPOLATED_NOISE_RATIO: f64 = 3.25;
 
-/// Smallest change of the travel from step to step that is no rounding error, in m; the multiple of the encoder's step by which a travel may
-/// be off, half a step at either end and some of the log; and the number of changes by one step that show an encoder at work.
+/// Encoder detection: smallest change of the travel from step to step that is not a rounding error, in m; largest error of a travel in
+/// encoder steps (half a step at either end, and an error of the log); number of changes by one step that confirm an encoder.
 const MIN_ENCODER_STEP_M: f64 = 1e-12;
 const ENCODER_STEPS: f64 = 1.5;
 const MIN_SIGHTINGS: u8 = 4;
@@ -43,12 +43,11 @@ pub(crate) struct VelocityEstimator {
     usual: f64,
     noise: f64,
     logged_mps: f64,
-    /// Travel of the last step in m, its smallest change so far, and how often it has changed by that: the step of the encoder, if it has
-    /// one.
+    /// Travel of the last step in m, its smallest change so far (the encoder step, if there is one), and how often that change occurred.
     moved_m: f64,
     encoder_step_m: f64,
     sightings: u8,
-    /// Travel in m that the log has had since the position changed.
+    /// Travel in m by the logged velocity since the position last changed.
     unmoved_m: f64,
     /// Mean velocities of the last three steps in m/s, newest first, and whether they have jumped.
     step_mps: [f64; 3],
@@ -135,7 +134,7 @@ impl VelocityEstimator {
         let (noise, position_mps) = self.velocity_from_positions(
             DISAGREEMENT_SDS_SQUARED * at_least(min_variance, self.noise / STEP_NOISE_RATIO),
         );
-        // Jumps are no noise.
+        // Velocity jumps must not count as noise.
         let clip = at_least(min_variance, DISAGREEMENT_SDS_SQUARED * self.noise);
         self.noise += gain * (at_most(clip, noise) - self.noise);
         self.accurate_positions = EXTRAPOLATED_NOISE_RATIO * self.noise <= min_variance;
@@ -152,12 +151,13 @@ impl VelocityEstimator {
         (logged, false)
     }
 
-    /// Step of the encoder in m; zero as long as none is known.
+    /// Step of the encoder in m; zero while unknown.
     pub(super) fn encoder_step_m(&self) -> f64 {
         if self.sightings == MIN_SIGHTINGS { self.encoder_step_m } else { 0.0 }
     }
 
-    /// Travels of a rounded position differ by multiples of the encoder's step; those of an exact one by ever smaller amounts.
+    /// Updates the encoder step: travels of a rounded position differ by multiples of it, those of an exact one by arbitrarily small
+    /// amounts.
     #[inline(always)]
     fn look_for_encoder_step(&mut self, moved_m: f64) {
         let change_m = (moved_m - core::mem::replace(&mut self.moved_m, moved_m)).abs();
@@ -178,8 +178,8 @@ impl VelocityEstimator {
         self.accurate_positions && self.smoothed_log
     }
 
-    /// Noise variance that this step indicates in (m/s)², and the velocity from the positions. Notes a jump where the
-    /// squared second difference exceeds `limit`.
+    /// Noise variance in (m/s)² estimated from this step, and velocity from the positions. Sets `jumped` if the squared second
+    /// difference exceeds `limit`.
     fn velocity_from_positions(&mut self, limit: f64) -> (f64, f64) {
         let [now, last, before] = self.step_mps;
         let (change, previous_change) = (now - last, last - before);
@@ -191,7 +191,8 @@ impl VelocityEstimator {
         (STEP_NOISE_RATIO * second_difference, if smooth { now + 0.5 * change } else { now })
     }
 
-    /// A jump within the step explains a mean velocity between those at its ends; otherwise the positions are right.
+    /// Velocity when log and positions disagree: the log, if a jump within the step explains the mean velocity (which then lies between
+    /// the logged ones); otherwise the mean velocity.
     #[cold]
     fn resolve_disagreement(&mut self, before: f64, logged: f64, step: f64, limit: f64) -> (f64, bool) {
         let between = at_most(logged.max(before), at_least(logged.min(before), step));

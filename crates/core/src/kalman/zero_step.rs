@@ -1,7 +1,7 @@
-//! Steps of the sensor's zero while the needle is in tissue. A rupture relaxes the elastic force: the force falls, by no more
-//! than that, and what follows is another layer. A jump between two samples that goes up, or falls further than any rupture,
-//! is a step of the zero at once. A fall that may be a rupture is declared as one; where the base law holds, a rival estimator
-//! carries the old layer on with another zero, and takes over when it predicts the force better: the rupture is withdrawn.
+//! Steps of the sensor's zero while the needle is in tissue. At a rupture the force drops by at most the elastic force, and another
+//! layer follows. A jump between two samples that goes up, or drops further than a rupture can, is accepted as a step of the zero at
+//! once. A drop that may be a rupture is declared as one; where the base law holds, a rival estimator assumes the old layer with
+//! another zero. If the rival predicts the force better, the rupture is withdrawn.
 
 use super::air_history::MIN_JUMP_SHARE;
 use super::gaussian::{at_least, at_most};
@@ -10,26 +10,26 @@ use super::state::{KalmanEnhancer, MAX_ALARM_MISFIT, OPERATIONS_PER_RUPTURE};
 use super::zero_step_state::{Jump, Rival};
 use crate::sample::{Sample, ZeroStep};
 
-/// Samples by which a jump has to last, and within which it has to be level.
+/// Number of samples over which a jump must last and be level.
 const LASTING_SAMPLES: u8 = 3;
-/// Largest change of the deviation within them, as a share of the jump: loading that is faster than predicted grows.
+/// Largest change of the deviation within them, as a share of the jump; if loading is faster than predicted, the deviation grows.
 const MAX_GROWTH_SHARE: f64 = 0.3;
 /// Smallest jump in standard deviations of the noise.
 const MIN_JUMP_SDS: f64 = 5.0;
-/// Samples within which a fall is a jump.
+/// Longest drop that may be a step, in samples.
 const JUMP_SAMPLES: f64 = 3.0;
-/// Log odds of a rupture against a step of the zero before any data: twenty to one.
+/// Prior log odds of a rupture against a step of the zero: 20 to 1.
 const RUPTURE_PRIOR_NATS: f64 = 3.0;
-/// Log odds at which a step of the zero is accepted, and at which a rupture is.
+/// Log odds at which a step of the zero is accepted, and at which it is rejected.
 const ACCEPTED_NATS: f64 = 5.0;
 const DISMISSED_NATS: f64 = 5.0;
-/// Standard deviation of the size of a drop, as a share of it: the elastic force at a rupture is not known better.
+/// Relative standard deviation of the size of a drop, from the uncertainty of the elastic force at a rupture.
 const DROP_SD_SHARE: f64 = 0.1;
-/// Travel in m after which a rupture stands.
+/// Travel in m after which a rupture is final.
 const MAX_RIVAL_TRAVEL_M: f64 = 12e-3;
 
 impl KalmanEnhancer {
-    /// Takes a sample far off the prediction by `e_n`. True when the zero has jumped.
+    /// Adds a sample that deviates from the prediction by `e_n`; true when the deviations show a step of the zero.
     pub(super) fn is_lasting_jump(&mut self, sample: &Sample, (e_n, s): (f64, f64)) -> bool {
         let jump = &mut self.jump;
         if self.spike_samples <= 1 || jump.count == 0 {
@@ -57,7 +57,7 @@ impl KalmanEnhancer {
         let Jump { sum_n, count, start, variance, .. } = self.jump;
         let n = f64::from(count.max(1));
         let size_n = sum_n / n;
-        // Of the prediction, which all these samples share, and of the samples.
+        // Variance of the prediction, common to all these samples, plus that of the samples.
         let variance = variance + self.noise.variance * self.noise.long_run_factor();
         self.baseline.subtract_step(size_n);
         if !self.baseline.settled {
@@ -81,8 +81,8 @@ impl KalmanEnhancer {
     /// The lowest force in N that a rupture may leave.
     pub(super) fn lowest_after_rupture_n(&self, position_m: f64) -> f64 {
         let bias = self.noise.bias_n();
-        // A drop may go on, and friction is known only where the base law holds and the last rupture stands. That the tip is free is
-        // no more than likely: at one speed a soft layer looks like growing friction.
+        // Friction is known only where the base law holds, the drop is over and the last rupture is final. A free tip is not
+        // certain: at constant speed a soft layer looks like growing friction.
         let known = self.estimator.passed_count > 0
             && !self.estimator.tip_free
             && self.post_rupture.is_none()
@@ -96,7 +96,7 @@ impl KalmanEnhancer {
         bias + at_least(0.0, least * self.friction_drive_mps)
     }
 
-    /// A rupture is about to be declared, from the estimator before the fall. `None` where it is certainly one.
+    /// Rival of the rupture about to be declared, from the estimator before the drop. `None` if a step of the zero is excluded.
     pub(super) fn rival_of_rupture(&self, sample: &Sample) -> Option<Rival> {
         let candidate = self.candidate?;
         if self.misfit_weight > 0.0 || candidate.count > JUMP_SAMPLES || self.snapshot.tip_free {
@@ -122,7 +122,7 @@ impl KalmanEnhancer {
         })
     }
 
-    /// The rupture has been declared: its estimator, before the first sample.
+    /// Sets the estimator of the declared rupture, before its first sample.
     pub(super) fn set_rupture(&mut self, after: &LayerEstimator) {
         if let Some(rival) = &mut self.rival {
             let uncertain_n = DROP_SD_SHARE * self.last_drop_n.0;
@@ -131,7 +131,7 @@ impl KalmanEnhancer {
         }
     }
 
-    /// Both explanations of the last rupture take a sample.
+    /// Updates both explanations of the last rupture with a sample and accumulates their log-likelihood ratio.
     #[inline]
     pub(super) fn compare_rival(&mut self, sample: &Sample, rho: f64) {
         let Some(rival) = &mut self.rival else { return };
@@ -163,8 +163,8 @@ impl KalmanEnhancer {
         false
     }
 
-    /// Another rupture before the last one is decided. Its drop tells how much of the force was elastic, hence what friction
-    /// either explanation leaves; the last one is withdrawn where it would have to be negative.
+    /// Decides on the last rupture when another follows. The new drop shows how much of the force was elastic, and so the friction
+    /// under either explanation; the last rupture is withdrawn if its friction would be negative.
     pub(super) fn decide_rival_at_rupture(&mut self, sample: &Sample, rupture_m: f64) {
         let Some(rival) = self.rival else { return };
         let negative_nats = |mut estimator: LayerEstimator| {
@@ -181,7 +181,7 @@ impl KalmanEnhancer {
         }
     }
 
-    /// The last rupture was a step of the zero.
+    /// Withdraws the last rupture, which was a step of the zero.
     #[cold]
     fn withdraw_rupture(&mut self) {
         let Some(rival) = self.rival.take() else { return };

@@ -1,4 +1,4 @@
-//! What a jump of the force in tissue may be: a step of the zero, or a rupture.
+//! State of the tests that distinguish a step of the zero from a rupture.
 
 use super::layer_estimator::LayerEstimator;
 use super::shaft_friction::DryShaftFriction;
@@ -18,7 +18,7 @@ pub(super) struct Jump {
     pub(super) start: Sample,
 }
 
-/// The last rupture as a step of the zero.
+/// Competing explanations of the last rupture: step of the zero, and rupture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rival {
     /// The old layer with another zero.
@@ -29,7 +29,7 @@ pub(super) struct Rival {
     /// Log odds of the step in nats.
     pub(super) nats: f64,
     pub(super) at: Sample,
-    /// What the rupture has overwritten.
+    /// State to restore if the rupture is withdrawn.
     pub(super) dry_friction: DryShaftFriction,
     pub(super) contact: (Option<f64>, f64),
     pub(super) counts: (u32, u32, f64),

@@ -70,7 +70,7 @@ impl ContactDetector {
         libm::sqrt(self.m2 / (self.count - 1.0)).max(config.min_noise_n)
     }
 
-    /// Takes the sample with this index.
+    /// Processes the sample with this index.
     pub(crate) fn update(
         &mut self,
         config: &ContactConfig,

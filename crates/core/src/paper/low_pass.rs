@@ -16,7 +16,7 @@ impl<const N: usize> LowPassCoefficients<N> {
     /// `1 - exp(-dt/tau)` of each, recomputed only when the interval changes.
     #[inline]
     pub(crate) fn at_interval(&mut self, dt_s: f64) -> &[f64; N] {
-        // Time stamps carry rounding errors: a relative difference of 1e-9 is none.
+        // Relative differences below 1e-9 are rounding errors of the time stamps.
         if (dt_s - self.dt_s).abs() > 1e-9 * dt_s {
             self.recompute(dt_s);
         }

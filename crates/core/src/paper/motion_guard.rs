@@ -1,5 +1,5 @@
-//! Motions during which a change of force is no rupture \[D\]: reversal, hold, a sudden change of the commanded speed, and
-//! travel over tissue that the needle has already passed.
+//! Motions during which a change of force does not count as a rupture \[D\]: reversal, hold, a sudden change of the commanded
+//! speed, and travel over tissue that the needle has already passed.
 //!
 //! Position and velocity may be noisy: the velocity is smoothed, a change of speed is sudden only when it exceeds the scatter
 //! of the acceleration, and the needle revisits tissue only when the tip is clearly above its deepest point.
@@ -73,7 +73,7 @@ impl MotionGuard {
         let least = config.sudden_mps2 * config.sudden_mps2;
         let limit = if scattered > least { scattered } else { least };
         let sudden = size > limit;
-        // A jump counts as the limit in the scatter.
+        // A jump enters the scatter clipped to the limit.
         let clipped = if sudden { limit } else { size };
         self.scatter_mps2_squared += scatter * (clipped - self.scatter_mps2_squared);
         self.steady =

@@ -16,7 +16,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> SampleRing<B> {
         Self { storage, next: 0, slot: 0 }
     }
 
-    /// Forgets every sample.
+    /// Removes all samples.
     pub(crate) fn clear(&mut self) {
         self.next = 0;
         self.slot = 0;

@@ -1,10 +1,10 @@
-//! What names a case: everything about it follows from these words and numbers.
+//! Identifier of a case: all its properties are functions of these words and numbers.
 
 use crate::words::words;
 use serde::{Deserialize, Serialize};
 
 words! {
-    /// Which law the tissue follows.
+    /// Tissue law of the simulator.
     World {
         Plain = "plain": "the equations of docs/reference/model.md, implemented a second time",
         Rich = "rich": "a law of another form: bristles, foundation springs, damage, tearing, a bending needle",
@@ -12,7 +12,7 @@ words! {
 }
 
 words! {
-    /// What is wrong with the assumed simulation or the sensor.
+    /// Misspecification of the assumed scenario or of the sensor.
     Wrong {
         Nothing = "nothing": "nothing wrong: K, b, F known to 5 %, geometry exact, white or AR(1) noise, 200 Hz",
         Thickness = "thickness": "every layer's thickness off by up to 2, 5, 10 %",
@@ -46,7 +46,7 @@ words! {
 }
 
 words! {
-    /// How much of it.
+    /// Severity of the misspecification.
     Severity {
         Small = "small": "the first of the three amounts",
         Medium = "medium": "the second",
@@ -55,7 +55,7 @@ words! {
 }
 
 words! {
-    /// What is hidden in a case.
+    /// Hidden causes of a case.
     Hide {
         Clean = "clean": "nothing",
         One = "one": "one effect of the library",
@@ -68,7 +68,7 @@ words! {
 }
 
 words! {
-    /// How strong what is hidden is, by the RMS that a base law re-fitted to it leaves.
+    /// Strength of the hidden causes: RMS residual of the re-fitted base law.
     Size {
         Faint = "faint": "0.15 to 0.5 standard deviations of the noise",
         Medium = "medium": "0.5 to 5 standard deviations of the noise",
@@ -76,37 +76,37 @@ words! {
     }
 }
 
-/// Version of the case generator: under another number the same name may stand for another case, and outcomes do not mix. 2: every row
-/// hides other effects than its neighbours under the same index.
+/// Version of the case generator. Between versions the same identifier may denote different cases, so outcomes must not be mixed. 2:
+/// every row hides other effects than its neighbours under the same index.
 pub const GENERATOR_VERSION: u32 = 2;
 
-/// The version of files that do not say it.
+/// The version of files without a version.
 pub(crate) fn first_generator_version() -> u32 {
     1
 }
 
-/// A case by name.
+/// Identifier of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct CaseId {
-    /// World.
+    /// Tissue law of the simulator.
     pub world: World,
-    /// What is wrong.
+    /// Misspecification.
     pub wrong: Wrong,
-    /// How much of it.
+    /// Severity of the misspecification.
     pub severity: Severity,
-    /// What is hidden.
+    /// Hidden causes.
     pub hide: Hide,
-    /// How strong it is.
+    /// Strength of the hidden causes.
     pub size: Size,
     /// Seed of the generator.
     pub seed: u64,
-    /// Number of the case among those of its kind.
+    /// Index of the case among those with the same other fields.
     pub index: u64,
 }
 
 impl CaseId {
-    /// A number that belongs to this case alone. The severity does not enter: the same insertion is judged with little and
-    /// with much of what is wrong.
+    /// Seed of this case. It does not depend on the severity: the same insertion is tested at every severity of the
+    /// misspecification.
     #[must_use]
     pub fn case_seed(&self) -> u64 {
         let mut h = self.seed ^ 0x51_7c_c1_b7_27_22_0a_95;
@@ -116,7 +116,7 @@ impl CaseId {
         h
     }
 
-    /// A name for people and files.
+    /// Readable name, also used for files.
     #[must_use]
     pub fn name(&self) -> String {
         format!(
@@ -126,7 +126,7 @@ impl CaseId {
     }
 }
 
-/// A bijective scramble of 64 bits (SplitMix64's finaliser, Steele, Lea and Flood 2014).
+/// Bijective hash of 64 bits (SplitMix64's finaliser, Steele, Lea and Flood 2014).
 pub(crate) fn mix(x: u64) -> u64 {
     let x = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
     let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

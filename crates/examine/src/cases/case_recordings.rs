@@ -28,7 +28,7 @@ pub struct NamedFile {
     pub recording: Recording,
 }
 
-/// What an engine is given.
+/// Input of an engine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Question {
     /// Name of the case; it reveals nothing about the truth.
@@ -44,18 +44,17 @@ pub struct Question {
 pub struct Case {
     /// Identifier.
     pub id: CaseId,
-    /// What is hidden, and how it is measured.
+    /// Hidden causes, motions and noise.
     pub setup: CaseSetup,
-    /// What an engine is given.
+    /// Input of the engine.
     pub question: Question,
     /// The insertion of each recording, without noise.
     pub there: Vec<Insertion>,
 }
 
-/// Draws a case.
+/// Generates a case.
 ///
-/// # Errors
-/// When the simulated columns are no valid recording, which would be a bug of this crate.
+/// # Errors When the simulated columns are not a valid recording, which would be a bug of this crate.
 pub fn make_case(id: &CaseId) -> Result<Case, stylet_record::RecordError> {
     let setup = set_up_case(id);
     let mut rng = ChaCha8Rng::seed_from_u64(id.case_seed());

@@ -63,7 +63,7 @@ fn attempt_at(id: &CaseId, attempt: u64) -> CaseSetup {
     let mut rng = ChaCha8Rng::seed_from_u64(id.case_seed());
     rng.set_stream(1 + attempt);
     let amounts = MisspecificationAmounts::of(id.wrong, id.severity);
-    // A generator of its own: the number of layers must not shift the later draws.
+    // A separate generator, so that the number of layers does not shift the later draws.
     let mut stack_rng = ChaCha8Rng::seed_from_u64(rng.random());
     let assumed = draw_tissue::draw_assumed_tissue(&mut stack_rng, amounts.stack);
     let truth =

@@ -1,4 +1,4 @@
-//! Effects as they are hidden: shapes drawn over plausible ranges, and one number that makes them stronger.
+//! Draws the effects to hide: shape parameters over plausible ranges, and a strength that can be scaled.
 
 use super::case_id::Size;
 use super::draw_motion::{log_uniform, uniform};
@@ -7,7 +7,7 @@ use crate::simulator::tissue::Tissue;
 use rand::RngExt;
 use rand::rngs::ChaCha8Rng;
 
-/// What an effect has to be drawn for.
+/// Context of a draw.
 pub struct EffectContext<'a> {
     /// The true tissue.
     pub tissue: &'a Tissue,
@@ -15,9 +15,9 @@ pub struct EffectContext<'a> {
     pub largest_n: f64,
     /// Samples per second.
     pub rate_hz: f64,
-    /// How far K, b, F are off already, relative.
+    /// Relative error of K, b, F in this case.
     pub coefficients: f64,
-    /// Strength aimed at.
+    /// Target strength.
     pub size: Size,
 }
 
@@ -26,8 +26,8 @@ pub const TOLERANCE: f64 = 0.3;
 /// The same for thicknesses.
 pub const THICKNESS_TOLERANCE: f64 = 0.1;
 
-/// Effect number `which` of the library, at a first strength; those whose strength does not follow from a residual
-/// (`by_size`) at their own.
+/// Draws effect number `which` of the library at an initial strength; effects whose strength is not measured by a residual
+/// (`by_size`) at the final one.
 pub fn draw_effect(rng: &mut ChaCha8Rng, which: usize, case: &EffectContext) -> Effect {
     let sign = if rng.random::<bool>() { 1.0 } else { -1.0 };
     let depth = case.tissue.end_m() - case.tissue.surface_m;
@@ -90,7 +90,7 @@ pub fn draw_effect(rng: &mut ChaCha8Rng, which: usize, case: &EffectContext) -> 
         "tool_inertia" => Effect::ToolInertia { mass_kg: 2.0 },
         "drive_friction" => Effect::DriveFriction { force_n: 0.2 },
         "force_gain" => {
-            // A wrong gain on wrong coefficients has to stay within what the scenario allows.
+            // Gain and coefficient errors together must stay within the tolerance of the scenario.
             let most = ((1.0 + TOLERANCE) / (1.0 + case.coefficients) - 1.0).min(0.12);
             Effect::ForceGain { eps: sign * uniform(rng, 0.3, 0.95) * most }
         }
@@ -120,8 +120,8 @@ pub fn draw_effect(rng: &mut ChaCha8Rng, which: usize, case: &EffectContext) -> 
     }
 }
 
-/// Whether an effect's strength is drawn with its number, because no residual of a re-fitted base law tells it: it acts
-/// through the instants of ruptures alone, or not at all.
+/// Whether an effect's strength is drawn with its parameters, because the residual of a re-fitted base law does not measure
+/// it: the effect acts through the times of ruptures only, or not at all.
 #[must_use]
 pub fn has_size_parameter(effect: &Effect) -> bool {
     matches!(
@@ -133,7 +133,7 @@ pub fn has_size_parameter(effect: &Effect) -> bool {
     )
 }
 
-/// The effect stronger by about `factor`, within plausible numbers; none where its strength is fixed.
+/// The effect with its strength times about `factor`, within plausible values; `None` if its strength is fixed.
 #[must_use]
 pub fn scaled(effect: &Effect, factor: f64, largest_n: f64) -> Option<Effect> {
     use Effect::*;
@@ -164,7 +164,7 @@ pub fn scaled(effect: &Effect, factor: f64, largest_n: f64) -> Option<Effect> {
         CuttingForce { force_n } => CuttingForce { force_n: to(force_n, 0.002, 3.0) },
         IncompleteRelease { fraction } => IncompleteRelease { fraction: to(fraction, 0.003, 0.9) },
         HiddenMembrane { depth_m, stiffness_n_per_m, puncture_n } => {
-            // Higher and longer by the root each.
+            // Height and length each by the square root.
             let root = libm::sqrt(factor.clamp(0.1, 10.0));
             HiddenMembrane {
                 depth_m,

@@ -1,11 +1,12 @@
-//! The motions of a case: a constant speed with retraction, a slow sinusoid, and programs with ripple, holds and ways back.
+//! Draws the motions of a case: a constant speed with retraction, a slow sinusoid, and programs with ripple, holds and
+//! retractions.
 
 use crate::simulator::motion_path::{MotionPath, MotionPiece};
 use rand::RngExt;
 use rand::rngs::ChaCha8Rng;
 
-/// Speeds are drawn for stacks of this depth in m; deeper ones are gone through faster, so that a case stays below
-/// 45 000 samples at 200 Hz.
+/// Depth in m of the stacks for which speeds are drawn; deeper ones are passed faster, so that a case stays below 45 000
+/// samples at 200 Hz.
 const USUAL_DEPTH_M: f64 = 0.105;
 
 /// Uniform between two numbers.
@@ -18,7 +19,7 @@ pub fn log_uniform(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
     low * libm::pow(high / low, rng.random::<f64>())
 }
 
-/// The motions of `count` recordings from `start_m` to `depth_m`, each drawn; `hurry` divides all durations.
+/// Draws the motions of `count` recordings from `start_m` to `depth_m`; `hurry` divides all durations.
 pub fn draw_motions(
     rng: &mut ChaCha8Rng,
     count: usize,
@@ -81,7 +82,7 @@ impl Way {
     fn program(&self, rng: &mut ChaCha8Rng) -> MotionPath {
         let mut pieces = Vec::new();
         let mut left = self.length_m();
-        // A ripple and a hold are in every program; where is drawn.
+        // Every program has a ripple and a hold at random places.
         let (mut rippled, mut held) = (false, false);
         while left > 1e-6 {
             let speed = self.pace * uniform(rng, 1.5e-3, 6e-3);

@@ -6,11 +6,11 @@ use crate::simulator::tissue::{Layer, Tissue};
 use rand::RngExt;
 use rand::rngs::ChaCha8Rng;
 
-/// A layer is punctured by force in this share of the cases.
+/// Share of the layers that are punctured by force.
 const PUNCTURED: f64 = 0.65;
 /// The deepest usual stack in m.
 const USUAL_END_M: f64 = 0.11;
-/// The deepest of all in m.
+/// The deepest stack in m.
 const DEEPEST_M: f64 = 0.2;
 
 /// The assumed layers.
@@ -32,7 +32,7 @@ pub fn draw_assumed_tissue(rng: &mut ChaCha8Rng, stack: LayerStack) -> Tissue {
     let mut layers: Vec<Layer> = Vec::new();
     for i in 0..count {
         let thickness_m = uniform(rng, thick.0, thick.1);
-        // A drop that the noise hides is no rupture, one beyond any force sensor's range none either.
+        // The drop must exceed the noise and stay within the range of a force sensor.
         let least = stiff.0.max(0.3 / thickness_m);
         let most = stiff.1.min(12.0 / thickness_m).max(least);
         let stiffness_n_per_m = log_uniform(rng, least, most);
@@ -56,7 +56,7 @@ pub fn draw_assumed_tissue(rng: &mut ChaCha8Rng, stack: LayerStack) -> Tissue {
     Tissue { surface_m: 0.0, layers: layers.into_iter().map(rounded).collect() }
 }
 
-/// Numbers as a person would write them.
+/// Values rounded as a user would write them.
 fn rounded(l: Layer) -> Layer {
     let to = |x: f64, step: f64| (x / step).round() * step;
     Layer {
@@ -67,14 +67,13 @@ fn rounded(l: Layer) -> Layer {
     }
 }
 
-/// An error of half to the whole of `size`, of either sign.
+/// A random error of 0.5 to 1 times `size`, of either sign.
 fn off(rng: &mut ChaCha8Rng, size: f64) -> f64 {
     let sign = if rng.random::<bool>() { 1.0 } else { -1.0 };
     sign * size * uniform(rng, 0.5, 1.0)
 }
 
-/// The stack as it is. The draws do not depend on the amounts, so that one insertion is seen with more and less of what
-/// is wrong.
+/// Draws the true stack. The draws do not depend on the amounts, so that the same insertion occurs at every severity.
 pub fn draw_true_tissue(rng: &mut ChaCha8Rng, assumed: &Tissue, amounts: &MisspecificationAmounts) -> Tissue {
     let mut truth = assumed.clone();
     truth.surface_m += off(rng, 1.0) * amounts.surface_m;
@@ -90,7 +89,7 @@ pub fn draw_true_tissue(rng: &mut ChaCha8Rng, assumed: &Tissue, amounts: &Misspe
     truth
 }
 
-/// The stack as a scenario guesses it: every number wrong by a factor of its own.
+/// Draws a guessed stack: every parameter is off by an independent factor.
 pub fn draw_guessed_tissue(
     rng: &mut ChaCha8Rng,
     assumed: &Tissue,
@@ -107,7 +106,7 @@ pub fn draw_guessed_tissue(
     guess
 }
 
-/// The stack that one recording meets.
+/// Draws the stack of one recording, with its scatter.
 pub fn draw_encountered_tissue(
     rng: &mut ChaCha8Rng,
     truth: &Tissue,
@@ -115,7 +114,7 @@ pub fn draw_encountered_tissue(
 ) -> Tissue {
     let mut normal = || {
         let x: f64 = rand_distr::Distribution::sample(&rand_distr::StandardNormal, rng);
-        // Nobody's sample is three sigma off and kept.
+        // An experimenter would discard a specimen three standard deviations off.
         x.clamp(-2.5, 2.5)
     };
     let mut it = truth.clone();

@@ -23,7 +23,7 @@ pub enum RefitTerms {
     Nothing,
     /// Dry friction along the shaft.
     DryFriction,
-    /// What library effects commonly add: a constant, drift, drive and dry friction, inertia, cutting, a square law.
+    /// Common effects of the library: a constant, drift, drive and dry friction, inertia, cutting, a square law.
     Common,
 }
 
@@ -117,7 +117,7 @@ fn columns(row: &mut Vec<f64>, tissue: &Tissue, there: &Insertion, k: usize, ter
     }
 }
 
-/// Linear least squares by normal equations; its accuracy is sufficient for a strength.
+/// Linear least squares by normal equations, accurate enough for a strength.
 #[derive(Default)]
 struct LeastSquares {
     gram: Vec<Vec<f64>>,
@@ -144,7 +144,7 @@ impl LeastSquares {
         self.rows += 1.0;
     }
 
-    /// Mean square of the residual. Columns that the earlier ones span are left out.
+    /// Mean square of the residual. Columns spanned by earlier ones are left out.
     fn left_square(mut self) -> f64 {
         let n = self.product.len();
         let own: Vec<f64> = (0..n).map(|i| self.gram[i][i]).collect();

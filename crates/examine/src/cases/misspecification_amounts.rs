@@ -1,8 +1,8 @@
-//! How much of everything is wrong, as numbers.
+//! Amounts of misspecification of a case.
 
 use super::case_id::{Severity, Wrong};
 
-/// Which stacks are drawn.
+/// Number of layers of the drawn stacks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LayerStack {
     /// Two to four layers of 15 to 45 mm.
@@ -15,18 +15,18 @@ pub enum LayerStack {
     Six,
 }
 
-/// How much of everything is wrong. [`MisspecificationAmounts::none`] is the ordinary world.
+/// Amounts of misspecification. [`MisspecificationAmounts::none`] is the case without any.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MisspecificationAmounts {
-    /// Thickness, relative.
+    /// Relative error of the thicknesses.
     pub thickness: f64,
-    /// Surface in m, common to all recordings.
+    /// Error of the surface position in m, common to all recordings.
     pub surface_m: f64,
-    /// Surface in m, another one in every recording.
+    /// Error of the surface position in m, independent in every recording.
     pub surface_each_m: f64,
-    /// K, b, F, relative.
+    /// Relative error of K, b, F.
     pub coefficients: f64,
-    /// Largest factor by which the scenario's thickness, K, b, F are too large or too small.
+    /// Largest factor by which thickness, K, b, F of a guessed scenario are off.
     pub guess: f64,
     /// Whether there is a scenario.
     pub has_scenario: bool,
@@ -34,31 +34,31 @@ pub struct MisspecificationAmounts {
     pub encoder_m: f64,
     /// Step of the encoder in m.
     pub encoder_step_m: f64,
-    /// Irregularity of the instants, share of the interval.
+    /// Jitter of the sample times as a share of the interval.
     pub jitter: f64,
     /// Share of samples missing.
     pub dropped: f64,
-    /// Samples by which the force is late.
+    /// Delay of the force in samples.
     pub late_samples: f64,
-    /// Noise that grows, share of the force.
+    /// Standard deviation of the force-dependent noise as a share of the force.
     pub growing: f64,
-    /// Share of the noise's variance with tails.
+    /// Share of the noise variance with heavy tails.
     pub tails: f64,
-    /// Colour of the noise when it is prescribed.
+    /// Autoregressive coefficients of the noise, if prescribed.
     pub ar: Option<[f64; 2]>,
-    /// 1/f wander, in noise standard deviations.
+    /// 1/f drift, in noise standard deviations.
     pub wander: f64,
-    /// Hum's amplitude, in noise standard deviations.
+    /// Amplitude of the mains hum, in noise standard deviations.
     pub hum: f64,
     /// Range in N of a 12-bit converter.
     pub bits_range_n: Option<f64>,
     /// Samples per second.
     pub rate_hz: f64,
-    /// Layers.
+    /// Number of layers.
     pub stack: LayerStack,
-    /// Way in air in m.
+    /// Travel in air in m.
     pub air_m: f64,
-    /// Recordings.
+    /// Number of recordings.
     pub recordings: usize,
     /// Scatter of the puncture forces between recordings, relative.
     pub scatter_puncture: f64,
@@ -69,19 +69,19 @@ pub struct MisspecificationAmounts {
 }
 
 impl MisspecificationAmounts {
-    /// Whether nobody knows the layers to the usual tolerance.
+    /// Whether the layers are not known to the usual tolerance.
     #[must_use]
     pub fn is_tissue_guessed(&self) -> bool {
         self.guess > 1.0 || !self.has_scenario
     }
 
-    /// By how much the force is late in s.
+    /// Delay of the force in s.
     #[must_use]
     pub fn delay_s(&self) -> f64 {
         self.late_samples / self.rate_hz
     }
 
-    /// The ordinary world: nothing is wrong, but nobody knows K, b, F to better than 5 %.
+    /// No misspecification, except for the usual error of 5 % in K, b, F.
     #[must_use]
     pub fn none() -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! The rich law's ingredients as they are hidden, and what the library may call them.
+//! Draws the effects of the rich law to hide, and lists the library effects accepted for them.
 
 use super::case_id::Size;
 use super::draw_motion::{log_uniform, uniform};
@@ -7,7 +7,7 @@ use crate::simulator::tissue::Tissue;
 use rand::RngExt;
 use rand::rngs::ChaCha8Rng;
 
-/// Names of the ingredients.
+/// Names of the rich law's effects.
 pub const RICH_EFFECTS: [&str; 6] = ["bristles", "foundation", "damage", "tearing", "membrane", "bending"];
 
 /// Speed in m/s at which damage ruptures a layer at its puncture force: the middle of the motions.
@@ -15,7 +15,7 @@ const DAMAGE_SPEED_MPS: f64 = 3e-3;
 /// Free length of the needle in m (docs/reference/model.md, section 4).
 const NEEDLE_M: f64 = 0.153;
 
-/// Library effects that describe an ingredient, written down before any run. `unknown` is right for all of them.
+/// Library effects that describe an effect of the rich law, fixed before any run. `unknown` is correct for all of them.
 #[must_use]
 pub fn accepted_names(ingredient: &str) -> &'static [&'static str] {
     match ingredient {
@@ -57,7 +57,7 @@ pub fn accepted_names(ingredient: &str) -> &'static [&'static str] {
     }
 }
 
-/// Ingredient number `which` at a first strength, added to those that are there.
+/// Adds effect number `which` of the rich law at an initial strength.
 pub fn add_rich_effect(
     rng: &mut ChaCha8Rng,
     which: usize,
@@ -117,7 +117,7 @@ pub fn add_rich_effect(
     }
 }
 
-/// The ingredient alone, stronger by about `factor`; none where its strength is drawn with its number.
+/// The effects with their strength times about `factor`; `None` if the strength is drawn with the parameters.
 #[must_use]
 pub fn scaled(it: &RichEffects, factor: f64) -> Option<RichEffects> {
     let mut next = *it;
@@ -137,7 +137,7 @@ pub fn scaled(it: &RichEffects, factor: f64) -> Option<RichEffects> {
     Some(next)
 }
 
-/// Names of the ingredients that are there.
+/// Names of the effects present.
 #[must_use]
 pub fn names(it: &RichEffects) -> Vec<&'static str> {
     let there = [
@@ -151,7 +151,7 @@ pub fn names(it: &RichEffects) -> Vec<&'static str> {
     RICH_EFFECTS.iter().zip(there).filter_map(|(name, there)| there.then_some(*name)).collect()
 }
 
-/// Both lists of ingredients together; of one that is in both, the second's.
+/// Union of two sets of effects; the second has priority.
 #[must_use]
 pub fn combine(a: &RichEffects, b: &RichEffects) -> RichEffects {
     RichEffects {

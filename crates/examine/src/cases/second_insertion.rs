@@ -29,7 +29,7 @@ impl SecondInsertion {
         Self { id: *id, setup, made: Vec::new() }
     }
 
-    /// Where an insertion starts, in m.
+    /// Start position of an insertion in m.
     #[must_use]
     pub fn start_m(&self) -> f64 {
         -self.setup.amounts.air_m
@@ -41,7 +41,7 @@ impl SecondInsertion {
         1.03 * self.setup.assumed.end_m() + 3e-3
     }
 
-    /// What is hidden, by name.
+    /// Names of the hidden causes.
     #[must_use]
     pub fn hidden(&self) -> Vec<String> {
         self.setup.effects.iter().map(|e| e.id().to_owned()).collect()
@@ -69,8 +69,7 @@ impl SecondInsertion {
 
     /// Makes one more insertion.
     ///
-    /// # Errors
-    /// When the columns make no recording.
+    /// # Errors When the columns are not a valid recording.
     pub fn add_insertion(&mut self, path: MotionPath) -> Result<(), stylet_record::RecordError> {
         let number = self.made.len() as u64;
         let mut rng = ChaCha8Rng::seed_from_u64(self.id.case_seed());
@@ -81,7 +80,7 @@ impl SecondInsertion {
         Ok(())
     }
 
-    /// What an engine is given: all insertions so far.
+    /// Input of an engine: all insertions so far.
     #[must_use]
     pub fn question(&self) -> Question {
         let name = format!("case {:016x}", self.id.case_seed());

@@ -1,15 +1,14 @@
-//! Forces that the library lacks.
+//! Forces outside the effect library.
 //!
-//! Each is a function of the base's motion, of time, of depth or of the ruptures that no effect of docs/reference/model.md has. Their
-//! strength is what the re-fitted base law leaves *with* a constant, a drift, dry and drive friction, inertia, cutting
-//! and square laws re-fitted with it ([`RefitTerms::Common`](super::effect_strength::RefitTerms::Common)), so that what the library could take away is not
-//! counted.
+//! Each is a function of the base's motion, of time, of depth or of the ruptures that no effect of docs/reference/model.md has. Their strength is the
+//! residual of the base law re-fitted together with a constant, a drift, dry and drive friction, inertia, cutting and square laws
+//! ([`RefitTerms::Common`](super::effect_strength::RefitTerms::Common)), so that the part that the library can explain is not counted.
 
 use crate::simulator::insertion::UnmodelledForce;
 use crate::simulator::motion_path::MotionState;
 use core::f64::consts::TAU;
 
-/// Kinds of them.
+/// Names of the shapes.
 pub const UNMODELLED_SHAPES: [&str; 16] = [
     "ripple_in_depth",
     "lumps_at_depths",
@@ -29,12 +28,12 @@ pub const UNMODELLED_SHAPES: [&str; 16] = [
     "oscillation_in_speed",
 ];
 
-/// One of them with its numbers, and what it remembers.
+/// A shape with its parameters and state.
 #[derive(Clone, Debug)]
 pub struct UnmodelledShape {
     /// Index into [`UNMODELLED_SHAPES`].
     pub kind: usize,
-    /// Numbers in 0..1.
+    /// Shape parameters in 0..1.
     pub u: [f64; 6],
     /// Size in N.
     pub size_n: f64,
@@ -53,11 +52,11 @@ struct Memory {
     healed: f64,
 }
 
-/// Below this speed in m/s the needle rests.
+/// Speed in m/s below which the needle is at rest.
 const REST_MPS: f64 = 1e-4;
 
 impl UnmodelledShape {
-    /// A shape that has not begun.
+    /// A shape in its initial state.
     #[must_use]
     pub fn new(kind: usize, u: [f64; 6], size_n: f64) -> Self {
         Self { kind: kind % UNMODELLED_SHAPES.len(), u, size_n, memory: Memory::default() }

@@ -25,13 +25,13 @@ const FRICTION_NS_PER_M2: (f64, f64) = (2e3, 1.5e4);
 /// Share of the thickness at which a layer is punctured, and share of the layers that only end at their far face.
 const PUNCTURED_AT: (f64, f64) = (0.5, 0.9);
 const NOT_PUNCTURED: f64 = 0.25;
-/// Way through air in m, and speed of a robot in m/s.
+/// Travel in air in m, and speed of a robot in m/s.
 const AIR_M: (f64, f64) = (4e-3, 8e-3);
 const SPEED_MPS: (f64, f64) = (2e-3, 6e-3);
 /// Speed in m/s at which damage ruptures a layer at its puncture force.
 const DAMAGE_SPEED_MPS: f64 = 3e-3;
 
-/// Everything about a stream but the realisation of its noise.
+/// Properties of a stream, without its noise realisation.
 #[derive(Clone, Debug)]
 pub struct StreamSetup {
     /// The tissue.
@@ -40,13 +40,13 @@ pub struct StreamSetup {
     pub path: MotionPath,
     /// Effects of law and sensor.
     pub effects: Vec<Effect>,
-    /// Ingredients of the rich law; `None`: the plain law.
+    /// Effects of the rich law; `None`: the plain law.
     pub rich: Option<RichEffects>,
     /// Travel in m over which a puncture releases its force.
     pub release_m: f64,
-    /// Motion of the tissue.
+    /// Periodic motion of the tissue.
     pub breath: Option<Breath>,
-    /// Forces from the side.
+    /// Disturbance forces on the needle's base.
     pub bumps: Bumps,
     /// Noise of the sensor.
     pub noise: SensorNoise,
@@ -168,12 +168,12 @@ fn draw_tissue(rng: &mut ChaCha8Rng, id: &StreamId) -> Tissue {
     Tissue { surface_m: 0.0, layers }
 }
 
-/// Ingredients of the rich law: those of the row, and in the rich world one or two others.
+/// Effects of the rich law: those of the row, and in the rich world one or two others.
 fn draw_rich(rng: &mut ChaCha8Rng, id: &StreamId, tissue: &Tissue) -> Option<RichEffects> {
     let of = |three: [f64; 3]| three[id.severity as usize];
     let mut others = RichEffects::default();
     for _ in 0..rng.random_range(1..=2) {
-        // A membrane would be a puncture that the law does not report.
+        // A membrane is left out: the law does not report its puncture.
         let which = [0, 1, 2, 3, 5][rng.random_range(0..RICH_EFFECTS.len() - 1)];
         add_rich_effect(rng, which, tissue, Size::Medium, &mut others);
     }

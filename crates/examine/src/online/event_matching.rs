@@ -1,19 +1,19 @@
-//! Which event of a detector belongs to which puncture.
+//! Matching of a detector's events to the true punctures.
 
 use super::simulate_stream::{Stream, TruePuncture};
 
-/// A puncture that a detector reports, at the sample at which it does.
+/// A puncture reported by a detector, with the time of the report.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Event {
     /// Time in s.
     pub time_s: f64,
     /// Drop of the force in N.
     pub drop_n: Option<f64>,
-    /// How sure the detector is; larger is surer.
+    /// Confidence of the detector; larger is more certain.
     pub confidence: Option<f64>,
 }
 
-/// When an event counts as the detection of a puncture.
+/// Window in which an event counts as the detection of a puncture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Window {
     /// From 50 ms before to 1 s after it.
@@ -24,9 +24,9 @@ pub enum Window {
     WithinHalfMillimetre,
 }
 
-/// An event may come this much before the puncture, in s.
+/// Largest time of an event before its puncture in s.
 const EARLY_S: f64 = 0.05;
-/// And this much after it.
+/// Largest time of an event after its puncture in s.
 const FOUND_S: f64 = 1.0;
 const CLOSE_S: f64 = 0.05;
 const CLOSE_M: f64 = 0.5e-3;
@@ -45,7 +45,7 @@ impl Window {
     }
 }
 
-/// Events that say again what an earlier one said: while a layer still tears, each of its steps may be reported.
+/// Number of repeated events of the same puncture: while a layer still tears, each of its steps may be reported.
 #[must_use]
 pub fn repeated_events(stream: &Stream, events: &[Event]) -> usize {
     let hits = match_events(stream, events, Window::Found);
@@ -58,7 +58,7 @@ pub fn repeated_events(stream: &Stream, events: &[Event]) -> usize {
     (0..events.len()).filter(|&k| !matched(k) && tears(&events[k])).count()
 }
 
-/// For each puncture the index of the first event in its window that no earlier puncture has.
+/// For each puncture, the index of the first event in its window that is not matched to an earlier puncture.
 #[must_use]
 pub fn match_events(stream: &Stream, events: &[Event], window: Window) -> Vec<Option<usize>> {
     let mut taken = vec![false; events.len()];

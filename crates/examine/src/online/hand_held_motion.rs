@@ -1,4 +1,4 @@
-//! Motions that no robot makes: a hand with tremor, a drive that sticks; and forces from the side.
+//! Hand-held motion with tremor, stick-slip motion of a drive, and short disturbance forces.
 
 use crate::cases::draw_motion::{log_uniform, uniform};
 use crate::simulator::insertion::UnmodelledForce;
@@ -24,7 +24,7 @@ fn blend(rng: &mut ChaCha8Rng, from_mps: f64, to_mps: f64, about_s: f64, tremor_
     MotionPiece::Blend { from_mps, to_mps, ripple_mps: TAU * ripple_hz * tremor_m, ripple_hz, duration_s }
 }
 
-/// A hand that goes from `start_m` to `depth_m` and part of the way back, with a tremor of this amplitude.
+/// Hand-held motion from `start_m` to `depth_m` and part of the way back, with a tremor of this amplitude.
 #[must_use]
 pub fn hand_held(rng: &mut ChaCha8Rng, start_m: f64, depth_m: f64, tremor_m: f64) -> MotionPath {
     let mut pieces = Vec::new();
@@ -60,7 +60,7 @@ pub fn hand_held(rng: &mut ChaCha8Rng, start_m: f64, depth_m: f64, tremor_m: f64
     MotionPath::new(start_m, pieces)
 }
 
-/// A drive that sticks and then jumps by about `jump_m`.
+/// Stick-slip motion with jumps of about `jump_m`.
 #[must_use]
 pub fn stick_slip(rng: &mut ChaCha8Rng, start_m: f64, depth_m: f64, jump_m: f64) -> MotionPath {
     let mut pieces = Vec::new();

@@ -1,5 +1,5 @@
-//! Benchmark of online puncture detection: streams of time, position and force without truth, and the scoring of what a detector
-//! says about them.
+//! Benchmark of online puncture detection: streams of time, position and force without truth, and the scoring of a detector's
+//! events.
 //!
 //! | module | contents |
 //! |---|---|

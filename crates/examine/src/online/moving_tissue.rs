@@ -1,4 +1,4 @@
-//! Tissue that moves under the needle: the law is given the motion relative to it.
+//! Tissue that moves under the needle: the force law is evaluated with the relative motion.
 
 use crate::simulator::force_law::{ForceKnot, ForceLaw};
 use crate::simulator::motion_path::MotionState;
@@ -19,7 +19,7 @@ pub struct Breath {
 pub struct MovingTissue<'a> {
     /// The law of the tissue at rest.
     pub law: &'a mut dyn ForceLaw,
-    /// How it moves.
+    /// Its motion.
     pub breath: Breath,
 }
 

@@ -1,4 +1,4 @@
-//! The samples of a stream, and what was really there.
+//! Simulation of a stream: samples and ground truth.
 
 use super::draw_stream::{StreamSetup, set_up_stream};
 use super::moving_tissue::MovingTissue;
@@ -22,7 +22,7 @@ const LONGEST_GAP: usize = 20;
 /// Resolution of the recorded position in m.
 const ENCODER_M: f64 = 1e-6;
 
-/// A puncture as it was.
+/// A true puncture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TruePuncture {
     /// Time in s.
@@ -31,14 +31,14 @@ pub struct TruePuncture {
     pub position_m: f64,
     /// Elastic force that it released in N.
     pub drop_n: f64,
-    /// Time in s at which all of it is released, after which the needle has gone far enough; infinite if it never does.
+    /// Time in s at which the release is complete; infinite if the needle does not travel far enough.
     pub released_s: f64,
 }
 
 /// A stream with its truth.
 #[derive(Clone, Debug)]
 pub struct Stream {
-    /// Which.
+    /// Identifier.
     pub id: StreamId,
     /// Nominal rate in Hz.
     pub rate_hz: f64,
@@ -135,7 +135,7 @@ pub fn simulate_stream(id: &StreamId) -> Stream {
 fn sample_times_s(setup: &StreamSetup, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let n = (setup.path.duration_s() * setup.rate_hz) as usize;
     let jitter = if setup.missing > 0.0 { JITTER } else { 0.0 };
-    // Gaps begin so often that this share is missing.
+    // Probability that a gap begins, so that this share is missing.
     let begins = setup.missing / (1.0 - setup.missing) / (0.5 * (1.0 + LONGEST_GAP as f64));
     let mut out = Vec::with_capacity(n);
     let mut missing = 0;

@@ -1,5 +1,5 @@
-//! Streams in a folder: `streams/NNNN.csv` and `streams.csv` with their rates, the truth in a key next to the folder; and the answers to
-//! them.
+//! Export of streams to a folder (`streams/NNNN.csv`, and `streams.csv` with their rates; the key with the truth next to the folder),
+//! and reading of answers.
 
 use super::event_matching::Event;
 use super::simulate_stream::{Stream, simulate_stream};
@@ -14,10 +14,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use stylet_stats::parallel::*;
 
-/// Version of the generator of streams: under another number the same name may stand for another stream.
+/// Version of the stream generator. Between versions the same identifier may denote different streams.
 const STREAM_VERSION: u32 = 1;
 
-/// The stream behind each number.
+/// Identifier of the stream of each number.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct StreamKey {
     stream_version: u32,
@@ -29,7 +29,7 @@ struct StreamKey {
 pub struct EntrantFile {
     /// Name of the detector.
     pub name: String,
-    /// Time per sample, with the way through the pipe, in ns.
+    /// Time per sample in ns, including the pipe.
     pub ns_per_sample: Option<f64>,
 }
 
@@ -53,8 +53,7 @@ fn content_error(path: &Path, why: impl Into<String>) -> ChallengeError {
 
 /// Writes streams in random order into a new folder, and their key next to it.
 ///
-/// # Errors
-/// [`ChallengeError`]; nothing half-written stays.
+/// # Errors [`ChallengeError`]; partial output is removed.
 pub fn export_streams(ids: &[StreamId], folder: &Path) -> Result<usize, ChallengeError> {
     if folder.exists() {
         return Err(ChallengeError::There(folder.display().to_string()));
@@ -150,8 +149,7 @@ alarms per hour. A layer may tear in steps: the first event counts, and further 
 
 /// The streams of a folder, from its `streams.csv`.
 ///
-/// # Errors
-/// [`ChallengeError`]: the file, and what it should hold.
+/// # Errors [`ChallengeError`] with the file and the expected content.
 pub fn exported_streams(folder: &Path) -> Result<Vec<ExportedStream>, ChallengeError> {
     let path = folder.join("streams.csv");
     let text = std::fs::read_to_string(&path).map_err(file_error(&path))?;

@@ -1,11 +1,11 @@
-//! What names a stream: everything about it follows from these words and numbers.
+//! Identifier of a stream: all its properties are functions of these words and numbers.
 
 use crate::cases::case_id::{Severity, World, mix};
 use crate::words::words;
 use serde::{Deserialize, Serialize};
 
 words! {
-    /// What makes the streams of a row difficult.
+    /// Difficulty of the streams of a row.
     Row {
         Constant = "constant": "constant speed; white noise of 10, 25, 50 mN",
         Sinusoid = "sinusoid": "one period of a slow sinusoid; white noise of 10, 25, 50 mN",
@@ -36,21 +36,21 @@ words! {
 }
 
 words! {
-    /// Streams for making a detector, or for judging it.
+    /// Streams for the development or for the test of a detector.
     Split {
         Make = "make": "for choosing settings; the truth is exported, too",
         Judge = "judge": "for judging; the truth stays in the key",
     }
 }
 
-/// A stream by name.
+/// Identifier of a stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct StreamId {
     /// Tissue law.
     pub world: World,
     /// Row of the table.
     pub row: Row,
-    /// How much of what the row is about.
+    /// Severity of the row's difficulty.
     pub severity: Severity,
     /// Set of streams to which this one belongs.
     pub split: Split,
@@ -61,7 +61,7 @@ pub struct StreamId {
 }
 
 impl StreamId {
-    /// A number that belongs to this stream alone.
+    /// Seed of this stream.
     #[must_use]
     pub fn stream_seed(&self) -> u64 {
         let mut h = self.seed ^ 0x0a_11_5e_ed_0b_a5_e5_01;

@@ -13,14 +13,14 @@ const THRESHOLDS: usize = 40;
 /// Rate of false alarms per hour at which the recall is stated.
 const STATED_PER_HOUR: f64 = 1.0;
 
-/// What a detector said about the streams, by their numbers.
+/// Answers of a detector by stream number.
 #[derive(Clone, Debug, Default)]
 pub struct EntrantAnswers {
     /// Name of the detector.
     pub name: String,
     /// Events in the order of time.
     pub events: BTreeMap<String, Vec<Event>>,
-    /// Error of its tip force over the RMS of the true one, for streams for which it gave one.
+    /// Relative RMS error of its tip force, for streams for which it gave one.
     pub enhancement: BTreeMap<String, f64>,
     /// Time per sample, with the way through the pipe, in ns.
     pub ns_per_sample: Option<f64>,
@@ -43,7 +43,8 @@ impl Rate {
         Self { value: (of > 0).then(|| hits as f64 / of as f64), low: interval.low, high: interval.high }
     }
 
-    /// F1 from hits, false alarms and misses. The share of hits among all three is a binomial one, of which F1 is a monotone function.
+    /// F1 from hits, false alarms and misses. Its interval is that of the binomial share of hits among all three, of which F1 is a
+    /// monotone function.
     fn f1(hits: usize, events: usize, punctures: usize) -> Self {
         let share = Self::of(hits, events + punctures - hits);
         let f1 = |x: f64| 2.0 * x / (1.0 + x);
@@ -51,7 +52,7 @@ impl Rate {
     }
 }
 
-/// A threshold of the confidence, and what it gives.
+/// Scores at a threshold of the confidence.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CurvePoint {
     /// Events below it are left out.
@@ -183,7 +184,7 @@ impl Counts {
     }
 }
 
-/// The quantile, `None` of no values.
+/// The quantile; `None` without values.
 fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
     (!values.is_empty()).then(|| stylet_stats::quantile(values, share))
 }
@@ -252,7 +253,7 @@ fn thresholds(answers: &EntrantAnswers) -> Vec<f64> {
     out
 }
 
-/// Whether a detector is as good as the best of a row: the best value lies within its interval.
+/// Whether a detector is not significantly worse than the best of a row: the best value lies within its interval.
 #[must_use]
 pub fn is_first(rate: &Rate, best: f64) -> bool {
     rate.high >= best

@@ -1,4 +1,4 @@
-//! What came of one case.
+//! Outcome of one case.
 
 use super::diagnosis_answer::{Answer, Estimate, Verdict};
 use super::expected_answer::{AnswerScore, Expected, expected_answer, score_answer};
@@ -24,14 +24,14 @@ pub struct ScoredParameter {
     /// Upper end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub high: Option<f64>,
-    /// Whether the 95 % interval holds the truth; none without an interval.
+    /// Whether the 95 % interval contains the truth; `None` without an interval.
     pub held: Option<bool>,
-    /// How well it is known, as the answer says.
+    /// Label of the parameter in the answer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub label: Option<String>,
 }
 
-/// What came of one case.
+/// Outcome of one case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CaseOutcome {
     /// The case.
@@ -41,22 +41,22 @@ pub struct CaseOutcome {
     pub generator_version: u32,
     /// What was hidden, by name.
     pub hidden: Vec<String>,
-    /// With which numbers.
+    /// Their parameter values.
     pub values: Vec<(String, f64)>,
-    /// How strong it was, in noise standard deviations.
+    /// Strength of the hidden causes in noise standard deviations.
     pub strength_sd: f64,
-    /// What was right.
+    /// The expected answer.
     pub expected: Expected,
-    /// What was said.
+    /// Verdict of the answer.
     pub verdict: Verdict,
     /// Grade of the model, A to D, if the answer has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grade: Option<String>,
     /// Causes named, each with its class.
     pub named: Vec<Vec<String>>,
-    /// Confidences of the causes, and whether each is one that is there.
+    /// Confidence of each cause, and whether it is correct.
     pub confidence: Vec<(f64, bool)>,
-    /// What that was worth.
+    /// Score of the answer.
     pub worth: AnswerScore,
     /// Estimated parameters with their true values.
     pub numbers: Vec<ScoredParameter>,
@@ -64,13 +64,13 @@ pub struct CaseOutcome {
     pub samples: usize,
     /// Wall time of the answer in s.
     pub seconds: f64,
-    /// Why there was no answer.
+    /// Reason for a missing answer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failed: Option<String>,
 }
 
 impl CaseOutcome {
-    /// Judges what an engine said. Without an answer the case counts as wrong.
+    /// Scores the answer of an engine. Without an answer the case counts as wrong.
     #[must_use]
     pub fn new(case: &Case, answer: Result<Answer, String>, seconds: f64) -> Self {
         let expected = expected_answer(&case.id, &case.setup);
@@ -126,7 +126,7 @@ impl CaseOutcome {
     }
 }
 
-/// Numbers of two terms, the faster one first: which is called the first is a matter of words.
+/// Parameters of two terms, the faster one first, because their order is arbitrary.
 fn in_order(numbers: &BTreeMap<String, Estimate>) -> BTreeMap<String, Estimate> {
     let time = |term: &str| numbers.get(&format!("{term}.time_constant_s")).map(|e| e.value);
     let (first, second) = ("terms.0", "terms.1");
@@ -143,7 +143,7 @@ fn in_order(numbers: &BTreeMap<String, Estimate>) -> BTreeMap<String, Estimate> 
 fn numbers(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
     let mut out = Vec::new();
     if !rich_world_effects::names(&case.setup.rich).is_empty() {
-        // A law of another form has no true values of the base law's numbers.
+        // A law of another form has no true values of the base law's parameters.
         return out;
     }
     for effect in &case.setup.effects {
@@ -154,7 +154,7 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
             if path == "layer" {
                 continue;
             }
-            // A force that the sensor sends late as well is late by both.
+            // The delays of sensor and effect add up.
             let late = matches!(effect, Effect::TimeDelay { .. });
             let truth = truth + if late { case.setup.amounts.delay_s() } else { 0.0 };
             let turn = if path.ends_with("_rad") {
@@ -175,7 +175,7 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
         }
     }
     let truth = &case.setup.truth;
-    // A gain or a scale of the position is the base law with other numbers: which of them are true is a matter of words.
+    // A gain or a position scale is equivalent to other base parameters, so their true values are not defined.
     let relabelled = |e: &Effect| matches!(e, Effect::ForceGain { .. } | Effect::PositionScale { .. });
     if case.setup.effects.iter().any(relabelled) {
         return out;

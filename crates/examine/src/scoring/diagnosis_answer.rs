@@ -50,7 +50,7 @@ pub struct BaseParameter {
     pub high: Option<f64>,
 }
 
-/// What an answer says about how well a parameter is known.
+/// Label of a parameter in an answer: how well it is determined.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LabelledParameter {
     /// Layer, 1-based; 0 for the surface and for effects.
@@ -90,7 +90,7 @@ pub enum Verdict {
     Ambiguous,
     /// Structure that no effect of the library explains dominates.
     Unknown,
-    /// No cause, but numbers of the scenario are wrong.
+    /// No cause, but parameters of the scenario are wrong.
     Parameters,
 }
 
@@ -115,10 +115,10 @@ pub struct Answer {
     /// Base parameters.
     #[serde(default)]
     pub base_parameters: Vec<BaseParameter>,
-    /// How well parameters are known.
+    /// Labels of the parameters.
     #[serde(default)]
     pub parameters: Vec<LabelledParameter>,
-    /// Effects that these recordings cannot show.
+    /// Effects that are not identifiable from these recordings.
     #[serde(default)]
     pub not_identifiable: Vec<String>,
     /// Effects too small to matter.
@@ -141,7 +141,7 @@ impl Answer {
         self.parameters.iter().find(is_it).map(|p| p.label.clone())
     }
 
-    /// "Nothing is wrong."
+    /// An answer without any finding.
     #[must_use]
     pub fn none() -> Self {
         Self {
@@ -157,8 +157,7 @@ impl Answer {
 
     /// Reads `diagnosis.json`.
     ///
-    /// # Errors
-    /// What is missing or of the wrong kind, and where.
+    /// # Errors The missing or invalid field, and its place.
     pub fn from_json(text: &str) -> Result<Self, serde_json::Error> {
         serde_json::from_str(text)
     }

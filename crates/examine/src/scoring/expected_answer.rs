@@ -1,13 +1,12 @@
-//! Which answers are right: written down per cause before any run.
+//! Expected answers: rules per cause, fixed before any run.
 //!
 //! The rules, with their reasons:
 //!
 //! 1. **What a user cannot know exactly is no cause** (docs/reference/algorithms.md): a wrong thickness, surface, K, b or F within the
-//!    stated tolerance, noise of any colour, growing, with tails, and scatter between recordings ask for the verdict
-//!    `none`. Irregular or missing samples are remarks on the data.
-//! 2. **What is there may be named, need not be** where a sensor's ordinary imperfection is the neutral form of an
-//!    effect: a force late by up to two samples *is* a `time_delay`, mains hum *is* a `periodic_interference`, a 12-bit
-//!    converter *is* a `quantisation`.
+//!    stated tolerance, noise of any colour, growing, with tails, and scatter between recordings require the verdict `none`. Irregular
+//!    or missing samples are remarks on the data.
+//! 2. **A cause may be named or not** where a sensor's ordinary imperfection is a form of an effect: a force late by up to two samples
+//!    *is* a `time_delay`, mains hum *is* a `periodic_interference`, a 12-bit converter *is* a `quantisation`.
 //! 3. **`force_gain` cannot be seen** once K, b, F are re-fitted (all forces scale): naming it is a guess, and
 //!    `none` is right. Its size is drawn within the tolerance.
 //! 4. **`position_scale` is the base law with other numbers**: recorded depths and speeds times `1 + eps` are thicknesses times
@@ -18,11 +17,11 @@
 //! 6. **A puncture that depends on speed cannot be seen in one recording**, in which every layer is punctured once: name or
 //!    `none`.
 //! 7. **Lags and delays below one sampling interval** cannot be distinguished: either name is accepted.
-//! 8. **Stribeck and presliding friction that dry friction imitates to less than 0.3 noise standard deviations** are
-//!    dry friction to anybody: `coulomb_friction` is right as well.
-//! 9. **A rich law's departures have no name of their own**: each ingredient lists the library effects that describe it
-//!    (a foundation spring may be `deep_indentation`), and `unknown` is right as well.
-//! 10. **Traces never count**, nor does what is listed as invisible.
+//! 8. **Stribeck and presliding friction that dry friction imitates to less than 0.3 noise standard deviations** cannot be distinguished
+//!    from dry friction: `coulomb_friction` is right as well.
+//! 9. **Effects of the rich law are not in the library**: each lists the library effects that describe it (a foundation spring may be
+//!    `deep_indentation`), and `unknown` is right as well.
+//! 10. **Negligible effects never count**, nor do those listed as not identifiable.
 //! 11. **A class** (`equivalent`) counts as its best member would if it holds a right one among at most four.
 //! 12. **Without a scenario** the number of layers has to be right as well.
 
@@ -35,21 +34,22 @@ use crate::scoring::diagnosis_answer::{Answer, Verdict};
 use crate::simulator::effect::Effect;
 use serde::{Deserialize, Serialize};
 
-/// A class of more effects than this says nothing.
+/// Largest class of effects that counts as an answer.
 pub const MAX_CLASS_SIZE: usize = 4;
-/// What dry friction may leave of Stribeck or presliding friction, in noise standard deviations, to pass for it (rule 8).
+/// Largest residual of dry friction fitted to Stribeck or presliding friction, in noise standard deviations, at which both count as
+/// equal (rule 8).
 const DRY_FRICTION_LIMIT_SD: f64 = 0.3;
 
-/// A cause that has to be found.
+/// An expected cause.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ExpectedCause {
-    /// The effect that is there.
+    /// The hidden effect.
     pub effect: String,
-    /// Names that are as right.
+    /// Equivalent names.
     pub also: Vec<String>,
-    /// Whether silence is right as well.
+    /// Whether leaving it out is correct as well.
     pub may_be_silent: bool,
-    /// Whether naming it is wrong: it cannot be seen.
+    /// Whether naming it is wrong because it is not identifiable.
     pub unseen: bool,
 }
 
@@ -61,7 +61,7 @@ impl ExpectedCause {
     }
 }
 
-/// What a right answer says.
+/// The expected answer.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Expected {
@@ -69,30 +69,30 @@ pub struct Expected {
     pub wanted: Vec<ExpectedCause>,
     /// Further names that are accepted.
     pub optional: Vec<String>,
-    /// Names that describe a rich law's ingredients.
+    /// Names that describe the effects of the rich law.
     pub allowed: Vec<String>,
-    /// Whether one of these, or `unknown`, has to be said.
+    /// Whether one of these, or `unknown`, is required.
     pub asks_for_allowed: bool,
-    /// Whether something is there that no library has.
+    /// Whether a force outside the library is present.
     pub outside: bool,
-    /// Whether `unknown` is right as well.
+    /// Whether `unknown` is correct as well.
     pub unknown_is_right: bool,
     /// Number of layers that have to be found; `None` when a scenario gives it.
     pub layers: Option<usize>,
 }
 
-/// What an answer was worth.
+/// Score of an answer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AnswerScore {
-    /// Right, and alone.
+    /// Correct and unique.
     pub correct: bool,
-    /// Some cause is named that is not there.
+    /// A cause is named that is not present.
     pub wrong_name: bool,
-    /// Every expected cause is found, whatever else is named.
+    /// Every expected cause is found; others may be named as well.
     pub all_found: bool,
 }
 
-/// What is right for a case.
+/// The expected answer for a case.
 #[must_use]
 pub fn expected_answer(id: &CaseId, setup: &CaseSetup) -> Expected {
     let mut out = Expected {
@@ -166,9 +166,9 @@ fn expected_cause(effect: &Effect, setup: &CaseSetup) -> ExpectedCause {
     it
 }
 
-/// Whether an ingredient may pass unsaid: a foundation that yields by less than the thickness may be off, or under layers that all
-/// give way by force (it is a softer layer then); damage that shows in no or in one recording's punctures; whatever leaves less
-/// than half a standard deviation of the noise.
+/// Whether an effect of the rich law may be left out: a foundation that yields by less than the thickness tolerance, or under layers
+/// that all rupture by force (equivalent to a softer layer); damage that affects the punctures of at most one recording; any effect
+/// with a residual below half a standard deviation of the noise.
 fn may_go_undetected(ingredient: &str, setup: &CaseSetup) -> bool {
     match ingredient {
         "foundation" => {
@@ -181,7 +181,7 @@ fn may_go_undetected(ingredient: &str, setup: &CaseSetup) -> bool {
     }
 }
 
-/// Judges an answer.
+/// Scores an answer.
 #[must_use]
 pub fn score_answer(expected: &Expected, answer: &Answer) -> AnswerScore {
     let classes: Vec<Vec<&str>> = answer
@@ -193,7 +193,7 @@ pub fn score_answer(expected: &Expected, answer: &Answer) -> AnswerScore {
             class
         })
         .collect();
-    // Each cause serves one wanted effect; exact names first, so that a class does not take another's place.
+    // Each cause matches one wanted effect; exact names first, so that a class does not take the place of another.
     let mut taken = vec![false; classes.len()];
     let mut all_found = true;
     let mut missing = false;

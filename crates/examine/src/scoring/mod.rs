@@ -1,4 +1,4 @@
-//! Which answers are right, and how many of an engine's are.
+//! Expected answers, and the scores of an engine.
 
 pub mod case_outcome;
 pub mod diagnosis_answer;

@@ -12,28 +12,28 @@ use stylet_stats::quantile_of;
 /// A cell: cases of one kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct TableCellId {
-    /// World.
+    /// Tissue law of the simulator.
     pub world: World,
-    /// What is wrong.
+    /// Misspecification.
     pub wrong: Wrong,
-    /// How much of it.
+    /// Severity of the misspecification.
     pub severity: Severity,
-    /// What is hidden.
+    /// Hidden causes.
     pub hide: Hide,
-    /// How strong.
+    /// Strength of the hidden causes.
     pub size: Size,
 }
 
-/// What came of a cell.
+/// Results of a cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TableCell {
     /// Which.
     pub id: TableCellId,
     /// Right answers.
     pub right: SuccessRate,
-    /// Answers in which all that is there is named, whatever else is.
+    /// Answers that name all hidden causes, and possibly others.
     pub all_found: SuccessRate,
-    /// Answers with a cause that is not there.
+    /// Answers with a cause that is not present.
     pub wrong_name: SuccessRate,
     /// Answers `unknown`.
     pub unknown: SuccessRate,
@@ -73,7 +73,7 @@ pub fn table_cells(outcomes: &[CaseOutcome]) -> Vec<TableCell> {
         .collect()
 }
 
-/// The table as text: rates with 95 % Wilson intervals, then what was said in place of what, intervals, confidence.
+/// The table as text: rates with 95 % Wilson intervals, then confusions, coverage of intervals, confidence.
 #[must_use]
 pub fn results_text(outcomes: &[CaseOutcome]) -> String {
     let mut out = String::new();
@@ -121,7 +121,7 @@ pub fn results_text(outcomes: &[CaseOutcome]) -> String {
     out
 }
 
-/// What is hidden, over all rows.
+/// Results by hidden cause over all rows.
 fn together(out: &mut String, outcomes: &[CaseOutcome]) {
     let mut by: BTreeMap<_, Vec<&CaseOutcome>> = BTreeMap::new();
     for o in outcomes {
@@ -135,7 +135,7 @@ fn together(out: &mut String, outcomes: &[CaseOutcome]) {
     }
 }
 
-/// What was said where the answer was not right.
+/// Wrong answers by hidden cause.
 fn said(out: &mut String, outcomes: &[CaseOutcome]) {
     let mut by: BTreeMap<(String, String), usize> = BTreeMap::new();
     for o in outcomes.iter().filter(|o| !o.worth.correct) {
@@ -159,7 +159,7 @@ fn said(out: &mut String, outcomes: &[CaseOutcome]) {
     }
 }
 
-/// How often 95 % intervals hold the truth.
+/// Coverage of the 95 % intervals.
 fn held(out: &mut String, outcomes: &[CaseOutcome]) {
     let mut by: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
     for n in outcomes.iter().flat_map(|o| &o.numbers) {
@@ -188,7 +188,7 @@ fn held(out: &mut String, outcomes: &[CaseOutcome]) {
     }
 }
 
-/// How often 95 % intervals hold the truth, and how often they are within 10 % of the value, by what the answer says about the parameter.
+/// Coverage of the 95 % intervals, and share of those within 10 % of the value, by the label of the parameter.
 fn labelled(out: &mut String, outcomes: &[CaseOutcome]) {
     /// Half width of a narrow interval, relative to the value.
     const NARROW: f64 = 0.1;
@@ -227,7 +227,7 @@ fn graded(out: &mut String, outcomes: &[CaseOutcome]) {
     }
 }
 
-/// How often a cause is there, by the confidence with which it is named; and the mean squared difference (Brier).
+/// Share of correct causes by their confidence, and the Brier score.
 fn confident(out: &mut String, outcomes: &[CaseOutcome]) {
     let all: Vec<(f64, bool)> = outcomes.iter().flat_map(|o| o.confidence.iter().copied()).collect();
     if all.is_empty() {

@@ -1,7 +1,7 @@
-//! The departures from the base law, written from the effects table of docs/reference/model.md: what they are called, their numbers, and
-//! which of these say how strong they are.
+//! Effects beyond the base law, written from the effects table of docs/reference/model.md: ids, parameters, and which of these are
+//! strengths.
 
-/// One departure with its numbers. Units are those of the parameter paths.
+/// An effect with its parameters. Units are those of the parameter paths.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs, reason = "names and units are those of docs/reference/model.md")]
 pub enum Effect {
@@ -117,7 +117,7 @@ impl Effect {
         }
     }
 
-    /// Its numbers with their parameter paths.
+    /// Its parameter values with their paths.
     #[must_use]
     pub fn parameters(&self) -> Vec<(String, f64)> {
         use Effect::*;

@@ -1,8 +1,8 @@
-//! What a law has to answer: the force at the needle's base between two instants, with its jumps.
+//! Interface of a force law: the force at the needle's base between two times, with its jumps.
 
 use super::motion_path::MotionState;
 
-/// The force at an instant. Two knots of one instant are a jump.
+/// The force at one time. Two knots at the same time are a jump.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceKnot {
     /// Time in s.
@@ -11,18 +11,18 @@ pub struct ForceKnot {
     pub force_n: f64,
 }
 
-/// A tissue through which a needle goes.
+/// Force law of a tissue with its state.
 pub trait ForceLaw {
     /// Puts the base at its first point and returns the force there.
     fn start(&mut self, at: &MotionState) -> f64;
 
-    /// Goes on to `to` on a stretch in which the base moves smoothly; adds the knots after the stretch's beginning.
+    /// Advances to `to` over an interval in which the base moves smoothly; adds the knots of this interval.
     fn advance(&mut self, to: &MotionState, knots: &mut Vec<ForceKnot>);
 
-    /// The base's speed changes at once, at the instant reached.
+    /// Changes the base's velocity abruptly at the present time.
     fn jump(&mut self, to: &MotionState, knots: &mut Vec<ForceKnot>);
 
-    /// Instants (s) at which layers gave way so far, in the order of the layers.
+    /// Times (s) of the ruptures so far, in the order of the layers.
     fn ruptures(&self) -> &[f64];
 
     /// Elastic force in N that each of these ruptures released, at once or over some travel.

@@ -1,6 +1,6 @@
 //! From the force at the needle's base to the recorded one (docs/reference/model.md): arm and tool, gain, low-pass, delay, bias
-//! and drift, interference, noise, saturation, quantisation. What a lag or a delay does between samples is exact for a
-//! force that is linear between knots, jumps included.
+//! and drift, interference, noise, saturation, quantisation. Lag and delay are exact for a force that is linear between knots,
+//! including jumps.
 
 use super::effect::Effect;
 use super::force_law::ForceKnot;
@@ -8,7 +8,7 @@ use super::plain_world::sgn;
 use core::f64::consts::TAU;
 use std::collections::VecDeque;
 
-/// The instrument: configuration.
+/// Configuration of the instrument.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SensorModel {
     mass_kg: f64,
@@ -18,7 +18,7 @@ pub struct SensorModel {
     delay_s: f64,
     bias_n: f64,
     drift_n_per_s: f64,
-    /// Steps of the zero: time, size.
+    /// Steps of the zero: time (s) and size (N).
     zero_steps: Vec<(f64, f64)>,
     /// Forces linear in position: slope, position without force.
     guides: Vec<(f64, f64)>,
@@ -78,7 +78,7 @@ impl SensorModel {
         self.scale * z
     }
 
-    /// What the sensor says at `t` for the force that came through gain, lag and delay, and its noise.
+    /// Sensor reading at `t` for a force after gain, lag and delay, with its noise.
     #[must_use]
     pub fn reading_n(&self, t: f64, force_n: f64, noise_n: f64) -> f64 {
         let mut f = force_n + self.bias_n + self.drift_n_per_s * t;
@@ -96,14 +96,14 @@ impl SensorModel {
         f
     }
 
-    /// The line from force to reading.
+    /// Initial state.
     #[must_use]
     pub fn start(&self) -> SensorState {
         SensorState { gain: self.gain, lag_s: self.lag_s, delay_s: self.delay_s, ..SensorState::default() }
     }
 }
 
-/// Gain, lag and delay with what is on its way.
+/// State of gain, lag and delay.
 #[derive(Clone, Debug, Default)]
 pub struct SensorState {
     gain: f64,
@@ -117,11 +117,11 @@ pub struct SensorState {
 }
 
 impl SensorState {
-    /// Takes in a knot.
+    /// Adds a knot.
     pub fn feed(&mut self, knot: ForceKnot) {
         let f = self.gain * knot.force_n;
         if !self.started {
-            // Before the first knot the force is taken to have been what it is there.
+            // The force before the first knot is assumed to be constant.
             self.started = true;
             self.lagged = f;
         } else if self.lag_s > 0.0 {
@@ -143,7 +143,7 @@ impl SensorState {
         }
     }
 
-    /// What comes out at `t`, the instant of the last knot.
+    /// Output at `t`, the time of the last knot.
     pub fn read(&mut self, t: f64) -> f64 {
         if self.delay_s <= 0.0 {
             return self.lagged;

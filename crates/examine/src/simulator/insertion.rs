@@ -1,13 +1,13 @@
-//! One needle going through tissue and instrument.
+//! Simulation of one insertion through tissue and instrument.
 
 use super::force_law::{ForceKnot, ForceLaw};
 use super::force_sensor::SensorModel;
 use super::motion_path::{MotionPath, MotionState};
 
-/// What was really there at the samples, without noise.
+/// True values at the samples, without noise.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Insertion {
-    /// Instants of the samples in s.
+    /// Sample times in s.
     pub time_s: Vec<f64>,
     /// True position of the base in m.
     pub position_m: Vec<f64>,
@@ -15,24 +15,24 @@ pub struct Insertion {
     pub velocity_mps: Vec<f64>,
     /// Acceleration of the base in m/s².
     pub acceleration_mps2: Vec<f64>,
-    /// Force that came through tool, gain, lag and delay in N.
+    /// Force after tool, gain, lag and delay in N.
     pub force_n: Vec<f64>,
     /// Force on the tip in N, without sensor and tool.
     pub tip_n: Vec<f64>,
-    /// Instants in s at which layers gave way.
+    /// Times of the ruptures in s.
     pub ruptures_s: Vec<f64>,
     /// Elastic force in N that each of them released.
     pub released_n: Vec<f64>,
 }
 
-/// A force that no library knows, added at the needle's base.
+/// A force outside the library, added at the needle's base.
 pub trait UnmodelledForce {
-    /// The force in N at a point of the base's motion; `ruptures` are the instants at which layers gave way so far.
+    /// The force in N at a point of the base's motion; `ruptures` are the times of the ruptures so far.
     fn force_n(&mut self, at: &MotionState, ruptures: &[f64]) -> f64;
 }
 
-/// Sends a needle along `path`; the force is kept at the instants `at_s` (increasing, from 0), with steps of at most
-/// `step_s` in between. Borders of the path's pieces are stepped to.
+/// Simulates a needle along `path`; samples the force at the times `at_s` (increasing, from 0), with steps of at most
+/// `step_s` in between and at the borders of the path's pieces.
 pub fn simulate_insertion(
     law: &mut dyn ForceLaw,
     instrument: &SensorModel,
@@ -64,7 +64,7 @@ pub fn simulate_insertion(
                 law.advance(&next, &mut knots);
                 let length = next.t - here.t;
                 for knot in &knots {
-                    // Inside the step the base's speed is as good as linear.
+                    // Within the step the base's speed is approximately linear.
                     let s = if length > 0.0 { (knot.t - here.t) / length } else { 1.0 };
                     let p = MotionState {
                         t: knot.t,

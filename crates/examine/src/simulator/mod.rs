@@ -1,5 +1,5 @@
-//! Simulator of tissue, needle and sensor, written from docs/reference/model.md without any other crate of this project
-//! but the recording type.
+//! Simulator of tissue, needle and sensor, implemented from docs/reference/model.md; of this project it uses the recording
+//! type only.
 //!
 //! | module | contents |
 //! |---|---|

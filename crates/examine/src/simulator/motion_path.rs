@@ -3,7 +3,7 @@
 
 use core::f64::consts::{PI, TAU};
 
-/// Position, velocity and acceleration of the base at an instant.
+/// Position, velocity and acceleration of the base at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MotionState {
     /// Time in s.
@@ -31,7 +31,7 @@ pub enum MotionPiece {
         /// Duration in s.
         duration_s: f64,
     },
-    /// `A (1 - cos(2 pi f t))`: from rest, and back.
+    /// `A (1 - cos(2 pi f t))`: starts from rest and returns.
     Swing {
         /// Amplitude `A` in m.
         amplitude_m: f64,
@@ -116,7 +116,7 @@ impl MotionPiece {
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionPath {
     pieces: Vec<MotionPiece>,
-    /// Instant (s) and position (m) at which each piece begins, and those of the end.
+    /// Time (s) and position (m) at the start of each piece, and at the end.
     starts: Vec<(f64, f64)>,
 }
 
@@ -165,13 +165,13 @@ impl MotionPath {
         self.pieces.is_empty()
     }
 
-    /// When piece `index` ends, in s.
+    /// End of piece `index` in s.
     #[must_use]
     pub fn piece_end_s(&self, index: usize) -> f64 {
         self.starts.get(index + 1).map_or(f64::INFINITY, |s| s.0)
     }
 
-    /// The base at `t`, as piece `index` has it.
+    /// The base at `t` in piece `index`.
     #[must_use]
     pub fn at(&self, index: usize, t: f64) -> MotionState {
         let (Some(piece), Some(&(t0, z0))) = (self.pieces.get(index), self.starts.get(index)) else {

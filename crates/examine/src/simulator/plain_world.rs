@@ -1,7 +1,7 @@
 //! The plain law: the equations of docs/reference/model.md.
 //!
-//! Between two instants everything but ruptures is taken along exactly or to second order; a rupture is looked for inside
-//! the step by bisection and put where its condition is met, so that the instants do not depend on the step.
+//! Within a step everything but ruptures is integrated exactly or to second order; a rupture is located within the step by
+//! bisection of its condition, so that its time does not depend on the step.
 
 use super::effect::Effect;
 use super::force_law::{ForceKnot, ForceLaw};
@@ -12,9 +12,9 @@ use super::tissue::Tissue;
 pub const DEAD_BAND_MPS: f64 = 1e-5;
 /// Reference speed of power law and rate-dependent puncture in m/s (docs/reference/model.md).
 const V0_MPS: f64 = 1e-3;
-/// Ruptures are placed to this precision in s.
+/// Precision of rupture times in s.
 const INSTANT_S: f64 = 1e-9;
-/// A compliant needle's tip is solved for to this force in N.
+/// Tolerance in N of the force balance of a compliant needle.
 const BALANCE_N: f64 = 1e-9;
 
 /// Sign with the dead band.
@@ -37,7 +37,7 @@ struct Slab {
     puncture: f64,
 }
 
-/// The tissue's departures, by their place in the law. Neutral ones are absent.
+/// Active effects of the tissue, by their place in the law.
 #[derive(Default)]
 struct Departures {
     kappa: f64,
@@ -59,7 +59,7 @@ struct Departures {
     hysteresis: Option<(f64, f64)>,
 }
 
-/// What the law remembers.
+/// State of the law.
 #[derive(Clone, Copy, Default)]
 struct Memory {
     t: f64,
@@ -77,10 +77,10 @@ struct Memory {
     /// Elastic force of the loading branch.
     loading_n: f64,
     active_n: f64,
-    /// Dahl's state.
+    /// State of the Dahl friction.
     bristle: f64,
     deepest: f64,
-    /// Tip force kept back at the last rupture.
+    /// Tip force retained at the last rupture.
     kept: f64,
     membrane_gone: bool,
     total: f64,
@@ -95,14 +95,14 @@ pub struct PlainWorld {
     now: Memory,
     ruptures: Vec<f64>,
     released: Vec<f64>,
-    /// Releases under way: force and position.
+    /// Releases in progress: force and position.
     soft: Vec<(f64, f64)>,
-    /// Step for which the decays stand, and they.
+    /// Time step, and the decay factors for it.
     decay: (f64, [f64; 2]),
 }
 
 impl PlainWorld {
-    /// The law of a tissue with departures; those of tool, sensor and position do not concern it.
+    /// The law of a tissue with its effects; those of tool, sensor and position are ignored.
     #[must_use]
     pub fn new(tissue: &Tissue, effects: &[Effect]) -> Self {
         let mut slabs: Vec<Slab> = tissue
@@ -195,7 +195,7 @@ impl PlainWorld {
         (viscous, inside)
     }
 
-    /// The state after `dt` with the tip at `z`, moving at `v`, if nothing gives way.
+    /// The state after `dt` with the tip at `z`, moving at `v`, without a rupture.
     fn taken_to(&mut self, dt: f64, z: f64, v: f64) -> Memory {
         let from = self.now;
         let mut to = Memory { t: from.t + dt, z, v, deepest: from.deepest.max(z), ..from };
@@ -304,7 +304,7 @@ impl PlainWorld {
         self.with.membrane.is_some_and(|(depth, k, f)| !m.membrane_gone && k > 0.0 && k * (m.z - depth) >= f)
     }
 
-    /// The state a share `s` of the way to the base's next place.
+    /// The state after a share `s` of the step of the base.
     fn part(&mut self, s: f64, dt: f64, base: f64, base_v: f64) -> Memory {
         let from = self.now;
         let (z, v) = (from.base + (base - from.base) * s, from.base_v + (base_v - from.base_v) * s);
@@ -317,8 +317,8 @@ impl PlainWorld {
         to
     }
 
-    /// The tip of a compliant needle: where the law's force is the spring's. The tip's speed is the slope of its
-    /// position by the second-order backward formula, after a jump by the first-order one.
+    /// Tip position of a compliant needle, where the law's force equals that of the spring. The tip's speed is the slope of
+    /// its position by the second-order backward formula, after a jump by the first-order one.
     fn balanced(&mut self, dt: f64, base: f64, spring: f64) -> Memory {
         let from = self.now;
         let dt = dt.max(1e-12);
@@ -366,7 +366,7 @@ impl PlainWorld {
             z = next;
             (m, off) = eval(self, z);
         }
-        // Within the dead band the law's force jumps: the needle sticks, and the spring says how strongly.
+        // Within the dead band the law's force jumps: the needle sticks, and friction balances the spring.
         m.total = spring * (base - m.z);
         m.before = Some((from.z, dt));
         m
@@ -376,7 +376,7 @@ impl PlainWorld {
         self.layer_gives_way(m) || self.membrane_gives_way(m)
     }
 
-    /// What has reached its limit in the present state gives way.
+    /// Ruptures what has reached its limit in the present state.
     fn rupture(&mut self) {
         let m = self.now;
         if self.membrane_gives_way(&m) {

@@ -1,4 +1,4 @@
-//! A law of another form, of which the base law of docs/reference/model.md is the neutral case.
+//! A force law of another form, which contains the base law of docs/reference/model.md.
 //!
 //! | ingredient | law | neutral |
 //! |---|---|---|
@@ -14,13 +14,13 @@ use super::motion_path::MotionState;
 use super::tissue::Tissue;
 use std::collections::VecDeque;
 
-/// Elements of the shaft are at most this long in m.
+/// Largest length of a shaft element in m.
 const ELEMENT_M: f64 = 5e-4;
 /// Speed in m/s at which a bristle's travel is `delta`.
 const V_REF_MPS: f64 = 2e-3;
 /// Speed in m/s over which the bent shaft's rubbing changes sign.
 const RUB_MPS: f64 = 2e-5;
-/// Ruptures are placed to this precision in s.
+/// Precision of rupture times in s.
 const INSTANT_S: f64 = 1e-9;
 
 /// Friction with a history along the shaft.
@@ -36,7 +36,7 @@ pub struct Bristles {
     pub creep_s: f64,
 }
 
-/// What a layer rests on.
+/// Elastic foundation of a layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Foundation {
     /// Stiffness of the layer over that of its foundation.
@@ -87,7 +87,7 @@ pub struct Bending {
     pub rubbing: f64,
 }
 
-/// The ingredients; all absent is neutral.
+/// Effects of the rich law; without any it is the base law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RichEffects {
     /// Friction with a history.
@@ -110,9 +110,8 @@ struct Element {
     friction: f64,
 }
 
-/// Bristles of the elements that the shaft covers. All of them move at the needle's speed, so that in each step every
-/// one goes the same way towards the same end: `p -> e p + g`. The composition of these maps is kept (`scale`,
-/// `shift`) and each element stores what it would have to be mapped from.
+/// Bristles of the covered shaft elements. All move at the needle's speed, so that a step is the same affine map `p -> e p + g` for every element.
+/// The composition of these maps is stored (`scale`, `shift`), and each element stores its preimage.
 struct Shaft {
     elements: Vec<Element>,
     /// Elements that are covered completely: (stored value, friction times length).
@@ -150,7 +149,7 @@ impl Shaft {
         }
     }
 
-    /// Every bristle `p -> keep p + give`.
+    /// Maps every bristle by `p -> keep p + give`.
     fn relax(&mut self, keep: f64, give: f64) {
         self.scale *= keep;
         self.shift = keep * self.shift + give;
@@ -166,7 +165,7 @@ impl Shaft {
         }
     }
 
-    /// The tip comes to `z`: elements are covered, new ones with bristles at rest, or left behind.
+    /// Moves the tip to `z`: adds covered elements with bristles at rest, or removes uncovered ones.
     fn cover(&mut self, z: f64) {
         while let Some(e) = self.elements.get(self.full.len()) {
             let share = ((z - e.front) / e.length).clamp(0.0, 1.0);
@@ -204,7 +203,7 @@ impl Shaft {
         self.sum_weight + e.map_or(0.0, |e| e.friction * e.length * self.covered)
     }
 
-    /// Bristles' sum, weighted like friction.
+    /// Sum of the bristles, weighted by friction.
     fn bristles(&self) -> f64 {
         let e = self.elements.get(self.full.len());
         self.scale * self.sum_stored
@@ -240,12 +239,12 @@ pub struct RichWorld {
     now: Memory,
     ruptures: Vec<f64>,
     released: Vec<f64>,
-    /// Ruptures under way: force released and position.
+    /// Ruptures in progress: force released and position.
     torn: VecDeque<(f64, f64)>,
 }
 
 impl RichWorld {
-    /// The law of a tissue with ingredients.
+    /// The law of a tissue with these effects.
     #[must_use]
     pub fn new(tissue: &Tissue, with: &RichEffects) -> Self {
         let layers = tissue
@@ -269,7 +268,7 @@ impl RichWorld {
         }
     }
 
-    /// How far the bending needle's tip falls back in m.
+    /// Axial retreat of the bending needle's tip in m.
     fn falls_back(&self) -> f64 {
         self.with.bending.map_or(0.0, |b| {
             let aside = b.ratio * self.now.tip_n * b.compliance_m_per_n;
@@ -277,7 +276,7 @@ impl RichWorld {
         })
     }
 
-    /// The state a share `s` of the way to the base's next place, if nothing gives way.
+    /// The state after a share `s` of the step of the base, without a rupture.
     fn part(&self, s: f64, dt: f64, base: f64, v: f64) -> Memory {
         let from = &self.now;
         let dt = dt * s;
@@ -348,7 +347,7 @@ impl RichWorld {
         self.layer_gives_way(m) || self.membrane_gives_way(m)
     }
 
-    /// Goes to a state: the shaft follows, the force is summed up.
+    /// Accepts a state: updates the shaft and sums up the force.
     fn take(&mut self, to: Memory) {
         let dt = to.t - self.now.t;
         if let Some(b) = self.with.bristles {
@@ -400,7 +399,7 @@ impl RichWorld {
             self.ruptures.push(m.t);
             self.now.damage = 0.0;
             self.now.yielded = 0.0;
-            // What the next layer says at this place.
+            // Force of the next layer at this position.
             self.now.active_n = 0.0;
             self.now = self.part(0.0, 0.0, m.base, m.v);
             self.released.push(m.active_n - self.now.active_n);
@@ -411,7 +410,7 @@ impl RichWorld {
 
 /// Growth of damage over `dt` between two relative forces.
 fn grown(damage: &Damage, dt: f64, from: f64, to: f64) -> f64 {
-    // Below a third of the force an exponent of five and more is nothing.
+    // Below 0.3 of the force, damage with an exponent of five or more is negligible.
     let power = |x: f64| if x < 0.3 { 0.0 } else { libm::pow(x, damage.exponent) };
     dt / damage.time_s * 0.5 * (power(from) + power(to))
 }

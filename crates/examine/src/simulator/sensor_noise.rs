@@ -1,4 +1,4 @@
-//! What the sensor adds: noise of any colour, with tails, growing with the force; hum; spikes.
+//! Noise of the force sensor: autoregressive, heavy-tailed, force-dependent; mains hum; spikes.
 
 use rand::RngExt;
 use rand::rngs::ChaCha8Rng;
@@ -13,9 +13,9 @@ pub struct SensorNoise {
     pub ar: [f64; 2],
     /// Share of the variance that comes from a Student t of 3 degrees of freedom.
     pub tails: f64,
-    /// Standard deviation as a share of the force, on top.
+    /// Additional standard deviation as a share of the force.
     pub growing: f64,
-    /// Standard deviation of a 1/f wander in N.
+    /// Standard deviation of a 1/f drift in N.
     pub wander_n: f64,
     /// Amplitude in N of mains hum, and the frequency in Hz about which it drifts.
     pub hum: Option<(f64, f64)>,
@@ -31,14 +31,14 @@ impl SensorNoise {
     }
 }
 
-/// Time constants in s of the parts that make up a 1/f wander, two per decade.
+/// Time constants in s of the components of the 1/f drift, two per decade.
 const WANDER_S: [f64; 6] = [0.1, 0.316, 1.0, 3.16, 10.0, 31.6];
-/// The hum's frequency is drawn towards its middle with this time constant in s ...
+/// Time constant in s of the mean-reverting frequency of the hum ...
 const HUM_S: f64 = 20.0;
-/// ... and strays by this much in Hz.
+/// ... and its standard deviation in Hz.
 const HUM_HZ: f64 = 0.1;
 
-/// The noise with its memory.
+/// Generator of the noise with its state.
 pub struct NoiseGenerator<'a> {
     noise: &'a SensorNoise,
     rng: &'a mut ChaCha8Rng,
@@ -51,7 +51,7 @@ pub struct NoiseGenerator<'a> {
 }
 
 impl<'a> NoiseGenerator<'a> {
-    /// A source that has run for a while.
+    /// A generator in its stationary state.
     pub fn new(noise: &'a SensorNoise, rng: &'a mut ChaCha8Rng) -> Self {
         let [a1, a2] = noise.ar;
         let rho = a1 / (1.0 - a2);

@@ -1,4 +1,4 @@
-//! The tissue that is really there.
+//! The true tissue.
 
 /// One layer (docs/reference/model.md, section 1).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,5 +1,4 @@
-//! Soundness of compound files, the container of xls: a damaged chain of sectors that ends in a circle would be followed for
-//! ever.
+//! Check of compound files, the container of xls, for cyclic chains of sectors, in which a reader would loop for ever.
 
 /// Sector numbers from here on end a chain or mark free sectors.
 const FIRST_SPECIAL: u32 = 0xFFFF_FFFA;
@@ -29,7 +28,7 @@ fn check(bytes: &[u8]) -> Option<bool> {
         bytes.get(from..bytes.len().min(from + size))
     };
     let numbers = |data: &[u8]| (0..data.len() / 4).filter_map(|k| u32_at(data, 4 * k)).collect::<Vec<u32>>();
-    // Sectors of the allocation table: in the header, then in a chain of their own.
+    // Sectors of the allocation table: in the header, then in a separate chain.
     let mut table_sectors: Vec<u32> = (0..HEADER_ENTRIES).filter_map(|k| u32_at(bytes, 76 + 4 * k)).collect();
     let (mut next, mut steps) = (u32_at(bytes, 68)?, 0);
     while next < FIRST_SPECIAL {

@@ -22,7 +22,7 @@ pub(super) struct File {
 struct Part {
     at: usize,
     of: usize,
-    /// Whether the values of a column stand together, as MATLAB stores them, or those of a row, as Python does.
+    /// Whether columns are contiguous, as in MATLAB, or rows, as in Python.
     by_column: bool,
 }
 

@@ -189,7 +189,7 @@ impl<'a> Elements<'a> {
         }
         let cut = || damaged("it ends within an element");
         let tag = u32_at(self.bytes, 0, self.little).ok_or_else(cut)?;
-        // Up to four bytes of data stand in the tag.
+        // Up to four bytes of data are stored in the tag.
         if tag >> 16 != 0 {
             let length = (tag >> 16) as usize;
             let data = self.bytes.get(4..4 + length).filter(|_| length <= 4).ok_or_else(cut)?;

@@ -30,7 +30,7 @@ pub(crate) trait NumericColumns {
     /// All columns, in the order of the file.
     fn columns(&self) -> Vec<NamedColumn>;
 
-    /// What the file holds and cannot be read, as sentences.
+    /// Parts of the file that cannot be read, as sentences.
     fn unreadable(&self) -> Vec<String> {
         Vec::new()
     }

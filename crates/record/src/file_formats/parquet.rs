@@ -75,7 +75,7 @@ fn read<T: DataType>(
     }
 }
 
-/// What the stored integers of a column count: parts of a second, or powers of ten.
+/// Meaning of the stored integers of a column: fractions of a second, or decimals.
 struct StoredAs {
     /// Values per unit.
     divisor: f64,

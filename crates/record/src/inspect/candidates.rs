@@ -1,4 +1,4 @@
-//! Which columns hold time, position and force: as the readers find them, else as contents and magnitudes suggest.
+//! Columns for time, position and force: as the readers find them, otherwise as suggested by contents and magnitudes.
 
 use super::magnitude::{epoch_unit, is_implausible, propose_units};
 use super::scan::{ColumnScan, Scan};
@@ -11,7 +11,7 @@ use crate::text::layout::ColumnKind;
 use crate::text::rows::RowsRead;
 use crate::units::{Dimension, quantity_of, split_name};
 
-/// Share of the variance that one of three components must hold to stand for all.
+/// Share of the variance from which one of three components is used instead of all.
 const MAIN_COMPONENT_SHARE: f64 = 0.99;
 /// Consecutive integers from which on a time is a sample number.
 const MIN_SAMPLE_NUMBERS: f64 = 99.0;
@@ -23,7 +23,7 @@ pub(super) struct Chosen {
     pub candidates: Vec<Candidate>,
     pub map: ColumnMap,
     pub map_needed: bool,
-    /// What the readers would refuse about the columns.
+    /// Errors that the readers would report about the columns.
     pub errors: Vec<(Role, RecordError)>,
     time: Option<Source>,
     position: Option<Source>,
@@ -94,7 +94,7 @@ impl Chosen {
     }
 }
 
-/// Rows in which position and force stand alone.
+/// Counts of rows with position or force only.
 #[derive(Debug, Default)]
 pub(super) struct Alternation {
     position_alone: usize,
@@ -112,7 +112,7 @@ impl Alternation {
         }
     }
 
-    /// Whether position and force stand in different rows.
+    /// Whether position and force are in different rows.
     pub(super) fn found(&self) -> bool {
         self.force_alone * 10 > self.both && self.position_alone * 10 > self.both && self.force_alone > 1
     }
@@ -285,7 +285,7 @@ impl Chosen {
         }
     }
 
-    /// The number by which a unit is judged, in the unit of the file.
+    /// The magnitude from which the unit is checked, in the unit of the file.
     fn magnitude(&self, scan: &Scan, role: Role, found: &MappedColumn, column: &ColumnScan) -> f64 {
         let all = || found.indices.iter().filter_map(|index| scan.columns.get(*index));
         match role {
@@ -331,7 +331,7 @@ fn name_or_number(head: TableHead<'_>, indices: &[usize]) -> Column {
     }
 }
 
-/// A column that contents suggest.
+/// A column suggested by its contents.
 fn suggest(
     head: TableHead<'_>,
     scan: &Scan,
@@ -405,7 +405,7 @@ fn signal_columns(head: TableHead<'_>, scan: &Scan, role: Role, free: &[usize]) 
     let moving: Vec<usize> = free
         .iter()
         .copied()
-        // A counter of messages or rows is no motion.
+        // A counter of messages or rows is not a motion.
         .filter(|at| !scan.columns[*at].is_constant() && !scan.columns[*at].is_counter())
         .collect();
     let of_quantity = |at: &usize| {

@@ -1,4 +1,4 @@
-//! What an inspection starts from: facts about the file, and its rows.
+//! Input of an inspection: facts about the file, and its rows.
 
 use super::model::TextFacts;
 use crate::error::RecordError;

@@ -11,7 +11,7 @@ use crate::text::layout::ColumnKind;
 use crate::text::rows::RowsRead;
 use stylet_stats::number_format::significant;
 
-/// Roughness of a position above that of the force, from which on both seem swapped.
+/// Ratio of the roughness of position and force above which both seem swapped.
 const SWAPPED_RATIO: f64 = 10.0;
 
 /// The text of an error without the name of the file.
@@ -66,7 +66,7 @@ fn columns(found: &mut Findings<'_>, head: TableHead<'_>, chosen: &Chosen, facts
     for (role, error) in &chosen.errors {
         let candidate = chosen.candidates.iter().find(|candidate| candidate.role == *role);
         let message = match (error, candidate) {
-            // Said below.
+            // Reported below.
             (RecordError::MissingColumn { .. }, None) => continue,
             (RecordError::MissingColumn { .. }, Some(candidate)) => format!(
                 "no column is the {} by name and unit; {} suggests \"{}\"",

@@ -1,7 +1,7 @@
-//! What a file holds: encoding, layout, columns, sampling, candidates for time, position and force, and a column map.
+//! Inspection of a file: encoding, layout, columns, sampling, candidates for time, position and force, and a column map.
 //!
-//! [`inspect`] reads any file that the readers know, reports everything that stands in the way at once, and proposes a
-//! [`ColumnMap`](crate::ColumnMap). It uses the steps of the readers; it only tolerates what these refuse.
+//! [`inspect`] reads any file that the readers know, reports all obstacles at once, and proposes a
+//! [`ColumnMap`](crate::ColumnMap). It uses the steps of the readers, but tolerates what they reject.
 //!
 //! ```
 //! use std::path::Path;

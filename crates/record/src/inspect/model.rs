@@ -14,7 +14,7 @@ pub struct InspectOptions {
     pub columns: Option<ColumnMap>,
 }
 
-/// What a file holds.
+/// Result of an inspection.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Inspection {
     /// The file.
@@ -33,7 +33,7 @@ pub struct Inspection {
     pub candidates: Vec<Candidate>,
     /// Time stamps, if there is a time.
     pub sampling: Option<Sampling>,
-    /// What is worth knowing, obstacles first.
+    /// Findings, obstacles first.
     pub findings: Vec<Finding>,
     /// The proposed column map.
     pub map: ColumnMap,
@@ -44,13 +44,13 @@ pub struct Inspection {
 }
 
 impl Inspection {
-    /// Whether the readers take the file as it is, without map and repair.
+    /// Whether the readers accept the file without map and repair.
     #[must_use]
     pub fn is_readable(&self) -> bool {
         !self.findings.iter().any(|finding| finding.obstacle)
     }
 
-    /// What stands in the way.
+    /// Findings for which the readers reject the file.
     pub fn obstacles(&self) -> impl Iterator<Item = &Finding> {
         self.findings.iter().filter(|finding| finding.obstacle)
     }
@@ -172,12 +172,11 @@ pub struct Candidate {
     pub unit: String,
     /// SI units per unit.
     pub scale: f64,
-    /// Whether name and unit say so; otherwise contents and magnitude suggest it.
+    /// Whether name and unit identify it; otherwise contents and magnitude suggest it.
     pub certain: bool,
     /// Why.
     pub reason: String,
-    /// Units that the magnitude suggests, the most typical one first, where the file does not say the unit or says one that is
-    /// implausible.
+    /// Units that the magnitude suggests, the most typical one first, if the file has no unit or an implausible one.
     pub proposals: Vec<UnitProposal>,
 }
 
@@ -210,11 +209,11 @@ pub struct Sampling {
     pub second_run_line: Option<u64>,
     /// Whether the time counts the samples.
     pub counts_samples: bool,
-    /// Whether position and force stand in alternate rows.
+    /// Whether position and force are in alternate rows.
     pub alternating: bool,
 }
 
-/// Something worth knowing about a file.
+/// A finding about a file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
     /// Kind: `columns`, `time`, `unit`, `sampling`, `values`, `layout`.
@@ -223,7 +222,7 @@ pub struct Finding {
     pub message: String,
     /// Line, from 1.
     pub line: Option<u64>,
-    /// Whether the readers refuse the file for it.
+    /// Whether the readers reject the file for it.
     pub obstacle: bool,
 }
 

@@ -1,15 +1,15 @@
-//! Errors of the readers with everything that stands in the way.
+//! Errors of the readers, extended by all obstacles that an inspection finds.
 
 use super::model::{Finding, Inspection};
 use crate::error::RecordError;
 use std::path::Path;
 
 impl RecordError {
-    /// Kind and line of the finding that says the same.
+    /// Kind and line of the finding with the same content.
     fn said(&self) -> Vec<(&'static str, Option<u64>)> {
         match self {
             Self::SampleNumber { line, .. } | Self::TimeUnit { line, .. } => {
-                // The finding stands at the names, the error at the first row.
+                // The finding refers to the line of the names, the error to the first row.
                 (line.saturating_sub(3)..=*line).map(|line| ("time", Some(line))).collect()
             }
             Self::Bursts { line, .. }

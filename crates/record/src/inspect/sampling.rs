@@ -5,10 +5,11 @@ use crate::time_order::{is_in_bursts, second_run_row};
 
 /// Least length of a gap in median intervals.
 const GAP_INTERVALS: f64 = 5.0;
-/// Consecutive integers from which on a time is a sample number.
+/// Consecutive integers from which a time column counts as a sample number.
 const MIN_SAMPLE_NUMBERS: usize = 100;
 
-/// The sampling of time stamps (s; NaN where a row has none). `unscaled` are they per unit of the file, `line` is that of a row.
+/// The sampling of time stamps (s; NaN where a row has none). `to_s` are seconds per unit of the file, `line` gives the line of
+/// a row.
 pub(super) fn sampling(time_s: &[f64], to_s: f64, line: impl Fn(usize) -> Option<u64>) -> Option<Sampling> {
     let rows: Vec<usize> = (0..time_s.len()).filter(|row| time_s[*row].is_finite()).collect();
     let times: Vec<f64> = rows.iter().map(|row| time_s[*row]).collect();

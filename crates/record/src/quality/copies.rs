@@ -1,4 +1,4 @@
-//! Recordings that hold the same samples.
+//! Detection of recordings with the same samples.
 
 use crate::error::RecordError;
 use crate::recording::Recording;
@@ -8,8 +8,8 @@ const EQUAL_SHARE: f64 = 1e-4;
 /// Least number of equal samples in a row.
 const MIN_EQUAL: usize = 50;
 
-/// Refuses the same recording given twice, under any name, with its clock shifted, rounded or cut: it would be held out and
-/// fitted at once.
+/// Rejects a recording given twice, also under another name, with a shifted clock, rounded or cut: it would be both fitted
+/// and held out.
 ///
 /// # Errors
 /// [`RecordError::Copies`] with the names of all copies.

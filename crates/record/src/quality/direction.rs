@@ -1,20 +1,21 @@
 //! Positions of the other sign, and recordings that hold only a retraction.
 //!
-//! A passive tissue takes up work: the force, less that before contact, times the travel is positive over an insertion, with
-//! its retraction and under cyclic loading. A negative work shows that position or force has the other sign.
+//! Passive tissue dissipates energy: the work of the force (minus that before contact) is positive over an insertion, its
+//! retraction and cyclic loading. Negative work shows that position or force has the wrong sign.
 
 use super::extent::Extent;
 use super::note::{QualityKind, QualityNote};
 use super::plausibility::{noise_n, rest_n};
 use crate::sample_stream::{Quantity, SampleStream};
 
-/// Share of the travel that is no insertion.
+/// Largest advance, as a share of the travel, of a recording without insertion.
 const MAX_ADVANCE_SHARE: f64 = 0.05;
 /// The work is summed over steps of this share of the travel, against the noise of the position.
 const STEP_SHARE: f64 = 0.005;
-/// Work over the sum of its absolute values, at most: that of drift and friction beside an elastic load is above.
+/// Largest ratio of the work to the sum of its absolute values; drift and friction together with an elastic load give a
+/// larger one.
 const MAX_WORK_RATIO: f64 = -0.3;
-/// Root mean square force over the steps in units of the noise, at least.
+/// Smallest RMS force over the steps in units of the noise.
 const MIN_FORCE_SD: f64 = 8.0;
 
 /// The note on a recording without an insertion: the position only falls, or the tissue does work on the needle.
@@ -63,7 +64,7 @@ struct Work {
 }
 
 impl Work {
-    /// Sums force less `rest_n` times travel over steps of `step_m`, with the mean force of the samples of each step.
+    /// Sums (force - `rest_n`) times travel over steps of `step_m`, with the mean force of each step.
     fn sum<A: SampleStream>(recording: &A, step_m: f64, rest_n: f64) -> Result<Self, A::Error> {
         let (mut from_m, mut sum_n, mut count) = (f64::NAN, 0.0, 0.0);
         let (mut net_j, mut absolute_j, mut square, mut steps) = (0.0, 0.0, 0.0, 0.0_f64);

@@ -1,4 +1,4 @@
-//! Quality notes and their kinds. The thresholds stand in the modules of the checks.
+//! Quality notes and their kinds. The thresholds are in the modules of the checks.
 
 use std::collections::BTreeMap;
 
@@ -80,7 +80,7 @@ pub struct QualityNote {
     /// Lines of the file (1-based); only for [`QualityKind::RepairedRows`].
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lines: Vec<u64>,
-    /// Whether a diagnosis from this recording is refused.
+    /// Whether a diagnosis from this recording is rejected.
     #[serde(default, skip_serializing_if = "is_false")]
     pub blocking: bool,
 }
@@ -90,7 +90,7 @@ fn is_false(b: &bool) -> bool {
 }
 
 impl QualityNote {
-    /// A note that refuses a diagnosis.
+    /// A blocking note.
     pub(crate) fn blocking<const N: usize>(
         kind: QualityKind,
         message: String,

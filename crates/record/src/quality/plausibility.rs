@@ -43,7 +43,7 @@ pub(super) fn no_motion(extent: &Extent) -> Option<QualityNote> {
     })
 }
 
-/// Value that no sensor gives, in any unit.
+/// Largest plausible value in any unit.
 const MAX_VALUE: f64 = 1e12;
 
 /// Values such as 1e300, which would overflow in computations.
@@ -192,7 +192,7 @@ fn median<E>(pass: impl FnMut(&mut dyn FnMut(f64)) -> Result<(), E>) -> Result<f
     Ok(quantiles_of_stream(&[0.5], pass)?.first().copied().unwrap_or(f64::NAN))
 }
 
-/// Standard deviation of the noise from differences of consecutive samples, whose median motion and ruptures hardly change.
+/// Standard deviation of the noise from the median difference of consecutive samples, which motion and ruptures hardly affect.
 pub(super) fn noise_n<A: SampleStream>(recording: &A) -> Result<f64, A::Error> {
     let step_n =
         median(|take| recording.for_each_pair(Quantity::Force, |before, now| take((now - before).abs())))?;

@@ -8,7 +8,7 @@ use stylet_stats::{MAD_TO_SD, median_of, quantiles_of_stream};
 const SIDE: usize = 5;
 /// Least distance from the local median in robust standard deviations.
 const SPIKE_SD: f64 = 8.0;
-/// Floor of the robust standard deviation as a share of the range, so that corners of noiseless data are no spikes.
+/// Floor of the robust standard deviation as a share of the range, so that corners of noiseless data do not count as spikes.
 const MIN_SD_SHARE: f64 = 1e-3;
 /// Least size of a spike in median steps around it.
 const MIN_SIZE_STEPS: f64 = 4.0;

@@ -3,12 +3,12 @@
 use encoding_rs::{CoderResult, Decoder, Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1250, WINDOWS_1252};
 use std::io::{self, Read};
 
-/// Bytes that a decision needs at most.
+/// Most bytes used to detect the encoding.
 const SAMPLE_BYTES: usize = 1 << 18;
-/// Share of zero bytes at even or odd places from which on a text without byte order mark is UTF-16.
+/// Share of zero bytes at even or odd places above which a text without byte order mark is UTF-16.
 const MIN_ZERO_SHARE: f64 = 0.3;
 
-/// The encoding of a text; `None` when the bytes are no text, with the place of the first zero byte.
+/// The encoding of a text. `Err` if the bytes are not text, with the place of the first zero byte.
 ///
 /// A byte order mark decides, then zero bytes at every second place, then validity as UTF-8. The rest is a Windows code page:
 /// 1250 when bytes inside words are letters only there, else 1252.

@@ -10,7 +10,7 @@ use crate::error::RecordError;
 use crate::units::parse_unit;
 
 impl LayoutHints {
-    /// What the map fixes.
+    /// The layout settings that a column map gives.
     pub(crate) fn new(map: Option<&ColumnMap>) -> Self {
         Self {
             header_line: map.and_then(|map| map.header_line),

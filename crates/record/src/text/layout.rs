@@ -48,16 +48,16 @@ impl TextLayout {
     }
 }
 
-/// What a column map fixes of the layout.
+/// Layout settings given by a column map.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct LayoutHints {
     pub header_line: Option<u64>,
     pub decimal_comma: Option<bool>,
 }
 
-/// Most lines that decide.
+/// Most lines used to find the layout.
 const MAX_LINES: usize = 3000;
-/// Rows that decide kinds of columns and the decimal sign.
+/// Rows used to find kinds of columns and the decimal sign.
 const SAMPLE_ROWS: usize = 400;
 /// Most lines between names and numbers.
 const MAX_HEADER_LINES: usize = 4;
@@ -98,7 +98,7 @@ fn data_width(fields: &[String]) -> usize {
     fields.len() - usize::from(fields.len() > 1 && fields.last().is_some_and(String::is_empty))
 }
 
-/// Share of the fields of a row that are numbers, dates or missing; `None` when it is no row of data.
+/// Share of the fields of a row that are numbers, dates or missing; `None` when it is not a row of data.
 fn purity(fields: &[String]) -> Option<f64> {
     let (mut numbers, mut others) = (0, 0);
     for field in fields {
@@ -132,7 +132,7 @@ fn block(lines: &[Line<'_>], delimiter: Delimiter) -> Option<Block> {
         .max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
     let first = rows.iter().position(|row| *row == Some(width))?;
     let mean = pure / count;
-    // One column alone is the last resort.
+    // A table of one column is chosen last.
     let score = count * mean * mean * if width > 1 { 1.0 } else { 0.1 };
     Some(Block { delimiter, width, first, score })
 }
@@ -150,7 +150,7 @@ fn without_comment_mark(line: &str) -> &str {
 pub(crate) fn find_layout(head: &str, from: usize, from_line: u64, hints: LayoutHints) -> Option<TextLayout> {
     let all = lines(head, from, from_line);
     let candidates = match hints.header_line {
-        // Rows before the given line are no data.
+        // Rows before the given line are not data.
         Some(names) => all.iter().filter(|line| line.number > names).copied().collect::<Vec<_>>(),
         None => all.clone(),
     };
@@ -280,7 +280,7 @@ fn header(all: &[Line<'_>], first: usize, block: &Block, hints: LayoutHints) -> 
         }
     }
     if header.names.is_none() {
-        // A row that reads like units is the names when nothing stands above it.
+        // A row that looks like units holds the names if there is nothing above it.
         header.units.clear();
         if let (Some(line), None) = (header.units_line.take(), hints.header_line)
             && let Some((at, fields)) = above.iter().find(|(at, _)| all[*at].number == line)

@@ -1,6 +1,6 @@
 //! Numbers and dates as text: decimal comma, thousands, missing values, ISO dates.
 
-/// What a field of a table holds.
+/// Content of a table's field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum FieldKind {
     /// A number; how its separators can be read.

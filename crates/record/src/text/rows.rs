@@ -29,14 +29,14 @@ pub(crate) struct MissingValue {
     pub text: String,
 }
 
-/// What was noticed while reading.
+/// Findings while reading rows.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct RowsRead {
     pub rows: usize,
     pub first_missing: Option<MissingValue>,
     /// Offset of a last row that is cut short.
     pub cut_row: Option<usize>,
-    /// Fields that are no numbers, by column; only with [`Tolerance::Lenient`].
+    /// Fields that are not numbers, by column; only with [`Tolerance::Lenient`].
     pub bad_values: Vec<BadValues>,
     /// Rows with another number of fields: how many, the line and the error of the first; only with [`Tolerance::Lenient`].
     pub ragged: Option<(usize, u64, std::sync::Arc<RecordError>)>,
@@ -44,7 +44,7 @@ pub(crate) struct RowsRead {
     pub origins: Vec<Option<i64>>,
 }
 
-/// Fields of a column that are no numbers.
+/// Fields of a column that are not numbers.
 #[derive(Debug, Clone)]
 pub(crate) struct BadValues {
     /// Which of the wanted fields.
@@ -55,18 +55,18 @@ pub(crate) struct BadValues {
     pub first: std::sync::Arc<RecordError>,
 }
 
-/// What happens to rows that are wrong.
+/// Handling of invalid rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Tolerance {
     /// They are errors.
     Strict,
-    /// They are counted; a field that is no number is missing, a row with another number of fields is left out.
+    /// They are counted; a field that is not a number is missing, a row with another number of fields is left out.
     Lenient,
 }
 
-/// Digits from which on an integer loses some as a number.
+/// Digits from which an integer is not exact as an `f64`.
 const LARGE_DIGITS: usize = 16;
-/// Least rows before a last row that is cut short and left out.
+/// Fewest rows before a truncated last row for leaving it out.
 const MIN_ROWS_BEFORE_CUT: usize = 3;
 
 /// Records with one delimiter.
@@ -144,7 +144,7 @@ pub(crate) fn read_rows(
     let mut row = csv::ByteRecord::new();
     let mut numbers = vec![0.0; wanted.len()];
     let mut read = RowsRead { origins: vec![None; wanted.len()], ..RowsRead::default() };
-    // Errors about lines that are passed over are made at the end: finding a line number reads the file from its beginning.
+    // Errors about skipped lines are created at the end, because finding a line number reads the file from its beginning.
     let mut short: Option<Ragged> = None;
     let mut ragged: Option<(usize, Ragged)> = None;
     let mut bad: Vec<(usize, usize, MissingValue)> = Vec::new();
@@ -246,7 +246,7 @@ impl Ragged {
     }
 }
 
-/// The value of a field, NaN when it is missing, `None` when it is no number.
+/// The value of a field, NaN when it is missing, `None` when it is not a number.
 #[inline]
 fn value(layout: &TextLayout, field: &WantedField, bytes: &[u8], origin: &mut Option<i64>) -> Option<f64> {
     // The whole text is UTF-8; a delimiter cannot split a character.

@@ -1,4 +1,4 @@
-//! The page of a check: what recordings can show before any effect is searched.
+//! The page of a check: what recordings can identify, before a search for effects.
 
 use crate::page_model::{Cell, Page, Section, Status, Table};
 use crate::pages::formatting::{effect_label, strength_parameters};

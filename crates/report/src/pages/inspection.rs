@@ -1,4 +1,4 @@
-//! The page of inspected files: what they hold and what stands in the way.
+//! The page of inspected files: contents and obstacles.
 
 use crate::chart_model::{Chart, Series};
 use crate::page_model::{Cell, Page, Section, Status, Table, Tile};

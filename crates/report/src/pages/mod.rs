@@ -1,7 +1,7 @@
 //! The pages of results: check, diagnosis, prediction, plan, identifiability, comparison, examination, sweep.
 //!
 //! One module per page. Each has a function `page` of the results; most have a `summary_sentence` that the terminal prints too. The
-//! pages show what the result files hold and compute nothing else.
+//! pages show the contents of the result files and do not compute anything else.
 
 pub mod algorithm_comparison;
 pub mod diagnosis;

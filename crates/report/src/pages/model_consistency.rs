@@ -1,4 +1,4 @@
-//! The page of two models: whether two diagnoses found the same one.
+//! The page of a comparison of the models found by two diagnoses.
 
 use crate::page_model::{Cell, Page, Section, Status, Table};
 use stylet_diagnose::model_consistency::Consistency;

@@ -1,4 +1,4 @@
-//! The page of a prediction: a fitted model against recordings that took no part in the fit.
+//! The page of a prediction: a fitted model against held-out recordings.
 
 use crate::chart_model::{Chart, Level, LineStyle, MarkerSet, Series, Side};
 use crate::page_model::{Cell, Page, Section, Status, Table, Tile};
@@ -10,7 +10,7 @@ use stylet_diagnose::prediction::{
 use stylet_scenario::Scenario;
 use stylet_stats::number_format::significant;
 
-/// Recordings with charts of their own.
+/// Largest number of recordings with individual charts.
 const MAX_CHARTED: usize = 12;
 
 /// The page of what `model`, which was read from `file`, predicts.
@@ -78,7 +78,7 @@ pub fn group_sentence(p: &Prediction) -> String {
     format!("{assumed}{both}.")
 }
 
-/// What the refit did.
+/// Changes by the refit.
 #[must_use]
 pub fn refit_sentence(p: &Prediction) -> Option<String> {
     let refit = p.refit.as_ref()?;

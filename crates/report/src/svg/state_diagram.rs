@@ -21,7 +21,7 @@ pub struct Arrow {
     pub to: usize,
     /// Label at its middle, one or more lines.
     pub lines: Vec<String>,
-    /// How far its middle is pushed to the left of its direction, in pixels.
+    /// Offset of its middle to the left of its direction, in pixels.
     pub bend_px: f64,
     /// Drawn dashed.
     pub dashed: bool,

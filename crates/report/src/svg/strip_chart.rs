@@ -1,5 +1,4 @@
-//! Strips: all values of several groups side by side, with median, 5th to 95th percentile and the value
-//! that would be right.
+//! Strip chart: all values of several groups side by side, with median, 5th to 95th percentile and reference value.
 
 use super::axis::axis_ticks;
 use super::figure_options::FigureOptions;
@@ -15,7 +14,7 @@ pub struct Strip {
     pub name: String,
     /// Colour.
     pub colour: Colour,
-    /// Every value; what is not finite is left out.
+    /// All values; values that are not finite are left out.
     pub values: Vec<f64>,
 }
 
@@ -24,7 +23,7 @@ pub struct Strip {
 pub struct StripGroup {
     /// Name below the group.
     pub name: String,
-    /// The right value, drawn across the group.
+    /// Reference value, drawn across the group.
     pub truth: Option<f64>,
     /// The strips.
     pub strips: Vec<Strip>,
@@ -35,7 +34,7 @@ pub struct StripGroup {
 pub struct StripChart {
     /// Quantity and unit.
     pub label: String,
-    /// Name of the line of the right value in the legend.
+    /// Name of the reference value in the legend.
     pub truth_label: String,
     /// The groups.
     pub groups: Vec<StripGroup>,

@@ -54,7 +54,7 @@ fn elastic(outcome: &Outcome) -> Option<f64> {
     outcome.elastic_error
 }
 
-/// The numbers of the liver on the slide.
+/// Assumed values of the liver on the slide.
 const LIVER: [Number; 6] = [
     Number::Noise,
     Number::LiverStiffness,

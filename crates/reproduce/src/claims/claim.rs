@@ -1,4 +1,4 @@
-//! A judged claim: the effect of each condition, and the verdict with its reason.
+//! An evaluated claim: the effect of each condition, and the verdict with its reason.
 
 use crate::claim_protocol::Protocol;
 use crate::claim_verdict::{Trial, Verdict};

@@ -1,4 +1,4 @@
-//! How a claim is computed: measure, bar, sensitivity conditions and assumed values, and the judgement on a study.
+//! Definition of a claim: measure, bar, sensitivity conditions and assumed values, and its evaluation on a study.
 
 use super::claim::{Claim, Condition, Primary};
 use super::verdict_reason;
@@ -24,7 +24,7 @@ pub struct Sensitivity {
     pub measure: Measure,
 }
 
-/// How a claim is computed.
+/// Definition of a claim.
 #[derive(Clone, Debug)]
 pub struct Definition {
     /// The protocol's text.
@@ -80,7 +80,7 @@ impl Definition {
         self
     }
 
-    /// Judges the claim on a study.
+    /// Evaluates the claim on a study.
     #[must_use]
     pub fn judge(&self, study: &Study) -> Claim {
         let protocol = Protocol::read(self.protocol);

@@ -13,7 +13,7 @@ const POORLY: Bar = Bar::Above(2.0);
 /// The targets of the supplement's Figs 10, 11, 12.
 const TARGETS: [Case; 3] = [Case::Gel70Constant, Case::LatexSinusoidal, Case::Liver];
 
-/// The numbers of ours in one gel, stack and liver.
+/// Assumed values of one gel, stack and liver.
 pub(super) const NUMBERS: [Number; 13] = [
     Number::Noise,
     Number::GelStiffness,

@@ -25,7 +25,7 @@ const ALL: [Case; 10] = [
     Case::Abdomen,
 ];
 
-/// How far apart as a factor, whichever is larger.
+/// Ratio of the larger to the smaller value.
 fn apart(view: &View<'_>, scale: Scale, value: fn(&Outcome) -> Option<f64>) -> Measured {
     let parts = ALL.iter().map(|&case| {
         let frequency = view.ml(case);

@@ -17,12 +17,12 @@ use stylet_core::Rls;
 const PRIOR: f64 = 1e6;
 /// Up to rounding: relative to the largest force and parameter.
 const ROUNDING: Bar = Bar::Below(1e-6);
-/// Samples after which a covariance is full.
+/// Samples after which a covariance is no longer diagonal.
 const TEN: usize = 10;
 
 type Samples = Vec<([f64; 2], f64)>;
 
-/// Which weights, and how they are applied.
+/// Weights, and their application.
 #[derive(Clone, Copy)]
 enum Weighting {
     /// `Lambda = diag(1, 1/v)`, once, at the start: eqs (12) and (17).
@@ -70,7 +70,7 @@ fn difference(samples: &Samples, weight: [f64; 2], weighting: Weighting) -> f64 
             }
         }
     }
-    // A recursion that has left the numbers is as wrong as can be.
+    // A diverged recursion counts as a relative difference of one.
     if worst.is_finite() { worst } else { 1.0 }
 }
 
@@ -115,7 +115,7 @@ pub(super) fn definition() -> Definition {
         .also("W P instead of Lambda P Lambda after ten samples (eq. 9 for a full covariance)", |v| {
             measured(v, Weighting::FullCovariance)
         });
-    // Bit for bit: any difference that a double can hold is above this.
+    // Bit for bit: any nonzero difference is above this.
     if let Some(exact) = claim.sensitivities.first_mut() {
         exact.bar = Bar::Below(f64::MIN_POSITIVE);
     }

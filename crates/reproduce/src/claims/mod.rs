@@ -45,7 +45,7 @@ pub fn definitions() -> Vec<Definition> {
     all
 }
 
-/// All claims, judged.
+/// Evaluates all claims.
 #[must_use]
 pub fn all(study: &Study) -> Vec<Claim> {
     definitions().iter().map(|d| d.judge(study)).collect()

@@ -82,11 +82,11 @@ fn make(study: &Study, spec: &Spec) -> Result<Figure, ReproduceError> {
     })
 }
 
-/// Seconds after a rupture, true or declared, that belong to it.
+/// Time in s after a true or declared rupture that is attributed to it.
 const AFTER_S: f64 = 1.0;
 
-/// Shares of the squared reconstruction error: shortly after a rupture, true or declared; otherwise before the last
-/// true one; otherwise behind it.
+/// Shares of the squared reconstruction error: shortly after a rupture, true or declared; otherwise before the last true
+/// one; otherwise after it.
 fn error_shares(insertion: &Insertion, run: &Run) -> [f64; 3] {
     let ruptures = &insertion.simulation.truth.ruptures;
     let mut from: Vec<f64> = ruptures.iter().map(|r| r.time_s).collect();
@@ -102,7 +102,7 @@ fn error_shares(insertion: &Insertion, run: &Run) -> [f64; 3] {
     shares.map(|s| s / all)
 }
 
-/// What the supplement says of the figure, and what is seen here.
+/// Comparison of the supplement's statements on the figure with the results here.
 fn statements(study: &Study, spec: &Spec, insertion: &Insertion, runs: &[Run]) -> Vec<[String; 3]> {
     let view = View::primary(study);
     let of = |ablation: Ablation| view.without(spec.case, ablation);
@@ -210,7 +210,7 @@ fn table(study: &Study, spec: &Spec) -> Sourced {
     })
 }
 
-/// Notes what the tables look up.
+/// Records the runs that the tables need.
 pub(super) fn ask(study: &Study) {
     for spec in &SPECS {
         let _ = table(study, spec);

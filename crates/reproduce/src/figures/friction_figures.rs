@@ -35,7 +35,7 @@ fn inputs() -> Sourced {
     crate::value_source::table_of(&cases)
 }
 
-/// Median over the seeds of the ratio of two estimates, over phantoms and what is paired besides.
+/// Median over the seeds of the ratio of paired estimates, over all phantoms and pairs.
 fn median_ratio(pairs: impl Iterator<Item = (Vec<Option<f64>>, Vec<Option<f64>>)>) -> String {
     let all: Vec<Option<f64>> = pairs.flat_map(|(a, b)| over(&a, &b)).collect();
     Spread::of(all.into_iter()).map_or("–".to_owned(), |s| {
@@ -48,7 +48,7 @@ fn median_ratio(pairs: impl Iterator<Item = (Vec<Option<f64>>, Vec<Option<f64>>)
     })
 }
 
-/// What the supplement says of the figure, and what is seen here.
+/// Comparison of the supplement's statements on the figure with the results here.
 fn statements(view: &View<'_>) -> Vec<[String; 3]> {
     const METHODS: [Method; 2] = [Method::Offline, Method::Online];
     let twelve: Vec<Vec<Vec<Option<f64>>>> = (0..PHANTOMS.len())

@@ -159,7 +159,7 @@ fn primary<'a>(study: &'a Study, spec: &Spec, kelvin_voigt: bool) -> &'a [Outcom
     View::primary(study).runs(spec.case, spec.sensor, kelvin_voigt, Ablation::None)
 }
 
-/// Over all seeds and the laboratory's range of noise: what of the figure is chance.
+/// Variation of the figure over all seeds and the laboratory's range of noise.
 fn numbers(study: &Study, spec: &Spec) -> Sourced {
     let mut rows = Vec::new();
     let setups: &[(Setup, &str)] = if spec.known.is_some() {
@@ -167,7 +167,7 @@ fn numbers(study: &Study, spec: &Spec) -> Sourced {
     } else {
         &[(Setup::Tuned, "depth unknown")]
     };
-    // Nothing but the joint torques' noise reaches the virtual sensor.
+    // The virtual sensor depends on the joint-torque noise only.
     let noises: &[u32] = if spec.sensor == Sensor::Virtual { &[NOISE_MN] } else { &[5, NOISE_MN, 20] };
     let show = |s: Option<Spread>, text: &dyn Fn(f64) -> String| {
         Cell::number(
@@ -226,7 +226,7 @@ fn numbers(study: &Study, spec: &Spec) -> Sourced {
     })
 }
 
-/// Notes what the figures look up.
+/// Records the runs that the figures need.
 pub(super) fn ask(study: &Study) {
     for spec in SUPPLEMENT.iter().chain(&MAIN) {
         let _ = numbers(study, spec);

@@ -80,7 +80,7 @@ pub(super) fn force(drawn: &Draw, runs: &[Run], enhanced: bool) -> Chart {
         chart = chart
             .with_series(Series::line(name, run.colour, t.clone(), run.trace.enhanced_n.clone()).width(1.3));
     }
-    // Above the others: the enhanced force is the measured one until something is compensated.
+    // Drawn last: the enhanced force equals the measured one until friction is compensated.
     let measured = drawn.force_n.clone();
     chart = chart.with_series(Series::line("measured", Colour::Green, t.clone(), measured).width(1.0));
     if enhanced {
@@ -95,7 +95,7 @@ pub(super) fn force(drawn: &Draw, runs: &[Run], enhanced: bool) -> Chart {
     }
 }
 
-/// When the needle is in which layer: from contact or rupture to the next rupture.
+/// Time spans of the layers: from contact or rupture to the next rupture.
 fn spans(insertion: &Insertion) -> Vec<(f64, f64, usize)> {
     let truth = &insertion.simulation.truth;
     let end = insertion.simulation.recording.time_s.last().copied().unwrap_or(0.0);
@@ -109,7 +109,7 @@ fn spans(insertion: &Insertion) -> Vec<(f64, f64, usize)> {
     spans
 }
 
-/// A value per span, held over it, with a gap behind.
+/// A value per span, constant over it and followed by a gap.
 fn held(spans: impl Iterator<Item = (f64, f64, f64)>) -> (Vec<f64>, Vec<f64>) {
     let (mut x, mut y) = (Vec::new(), Vec::new());
     for (from, to, value) in spans {
@@ -140,8 +140,8 @@ fn truth_line(insertion: &Insertion, value: impl Fn(&stylet_score::LayerTruth) -
     Series::line("true", Colour::Ink, x, y).styled(LineStyle::Dashed).width(1.6)
 }
 
-/// A range that shows truth and a posteriori estimates; what the online estimate does beyond is cut, but for a
-/// run without any a posteriori estimate, of which nothing else is to be seen.
+/// Axis range of truth and a posteriori estimates; the online estimate is clipped to it, except in runs without a posteriori
+/// estimates.
 fn range(series: &[Series], online: &Series, estimated: bool) -> (f64, f64) {
     let high = series.iter().flat_map(|s| &s.y).copied().filter(|y| y.is_finite()).fold(0.0, f64::max);
     let typical = stylet_stats::quantile_of(online.y.iter().copied().filter(|y| y.is_finite()), 0.9);

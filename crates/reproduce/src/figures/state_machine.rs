@@ -8,7 +8,7 @@ use stylet_core::{EnhanceConfig, State, TRANSITIONS};
 use stylet_report::svg::{Arrow, Diagram, FigureOptions, Node, state_machine};
 use stylet_report::{Cell, Table, significant};
 
-/// Where a state stands in the drawing: the only thing that is not read from the core.
+/// Position of a state in the drawing; everything else is read from the core.
 const fn place(state: State) -> (f64, f64) {
     match state {
         State::NoRupture => (170.0, 160.0),
@@ -16,12 +16,12 @@ const fn place(state: State) -> (f64, f64) {
         State::DetectedRupture => (950.0, 160.0),
         State::ForceDropMeasuring => (950.0, 360.0),
         State::ForceCompensation => (170.0, 360.0),
-        // Not one of the paper's, and not drawn.
+        // Not a state of the paper; not drawn.
         State::FreeTip => (0.0, 0.0),
     }
 }
 
-/// How far an arrow swings out, so that it meets neither a box nor its counterpart.
+/// Curvature of an arrow that avoids boxes and the reverse arrow.
 const fn bend(from: State, to: State) -> f64 {
     match (from, to) {
         (State::NoRupture, State::ExpectedRupture) => 26.0,
@@ -48,7 +48,7 @@ fn lines(state: State) -> Vec<String> {
     }
 }
 
-/// What sec. I of the supplement says of the machine, and what ours does.
+/// Comparison of sec. I of the supplement with this implementation.
 fn statements() -> Vec<[String; 3]> {
     let derivative = EnhanceConfig::paper().derivative;
     let completions = TRANSITIONS.iter().filter(|t| !t.in_supplement).count();

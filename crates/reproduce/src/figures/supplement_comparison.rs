@@ -1,4 +1,4 @@
-//! Compares what the supplement says about a figure with what is found here, and says why they differ.
+//! Compares the supplement's statements on a figure with the results here, with the reason of each difference.
 
 use super::insertion_panels::Run;
 use crate::run_outcome::Outcome;
@@ -7,7 +7,7 @@ use crate::simulated_insertion::Insertion;
 use crate::value_source::Sourced;
 use stylet_report::{Cell, Table, percent, significant};
 
-/// What a figure here is made of.
+/// Data of a figure.
 pub(super) struct Facts<'a> {
     pub insertion: &'a Insertion,
     pub measured_n: &'a [f64],
@@ -19,11 +19,11 @@ pub(super) struct Facts<'a> {
 
 /// A statement of the supplement about a figure.
 pub(super) struct Statement {
-    /// As the supplement has it.
+    /// The supplement's statement.
     says: &'static str,
-    /// What is computed here.
+    /// The result here.
     here: fn(&Facts<'_>) -> String,
-    /// What makes the difference.
+    /// Reason of the difference.
     why: &'static str,
 }
 
@@ -151,7 +151,7 @@ pub(super) const MAIN_14: &[Statement] = &[statement(
     "another arm and assumed noise: see claims f1 and f2",
 )];
 
-/// When the drawn runs declared a rupture.
+/// Times of the ruptures declared in the drawn runs.
 fn declared(runs: &[Run]) -> String {
     let of = |run: &Run| {
         let at: Vec<String> = run.trace.detections.iter().map(|d| significant(d.time_s, 4)).collect();
@@ -161,7 +161,7 @@ fn declared(runs: &[Run]) -> String {
     runs.iter().map(of).collect::<Vec<_>>().join("; ")
 }
 
-/// What can be said of every figure of an insertion by looking at it.
+/// Statements checked for every figure of an insertion.
 pub(super) fn looks(runs: &[Run], panels: &str) -> Vec<[String; 3]> {
     [
         (
@@ -179,7 +179,7 @@ pub(super) fn looks(runs: &[Run], panels: &str) -> Vec<[String; 3]> {
     .into()
 }
 
-/// The table of a figure from rows: what the supplement says, what is seen here, what makes the difference.
+/// The table of a figure, with rows of supplement's statement, result here, reason of the difference.
 pub(super) fn listed(rows: Vec<[String; 3]>) -> Sourced {
     Sourced::named(Table {
         title: "Compared with the supplement".to_owned(),

@@ -56,7 +56,7 @@ fn scenario_with(fields: &str) -> String {
     text + ")\n"
 }
 
-/// The value at a documented path, in which variants stand behind `/` and any element of a list is `[]`.
+/// The value at a documented path, in which variants follow a `/` and any element of a list is `[]`.
 fn value_at<'a>(text: &'a str, path: &str) -> Option<&'a str> {
     let mut plain = String::new();
     for (i, part) in path.split('/').enumerate() {
@@ -68,10 +68,10 @@ fn value_at<'a>(text: &'a str, path: &str) -> Option<&'a str> {
     text.get(entry.start..entry.end)
 }
 
-/// A value in one line, as a user would write it; what is inside the brackets of a long one is left out.
+/// A value in one line, as a user would write it; the content of long brackets is left out.
 fn brief(value: &str, max_length: usize) -> String {
     let line = value.split_whitespace().collect::<Vec<_>>().join(" ");
-    // The writer gives fields lines of their own, and marks names that Rust reserves.
+    // The writer puts each field on its own line, and marks names that are reserved in Rust.
     let line = line.replace("( ", "(").replace(", )", ")").replace("r#", "");
     match line.find(['(', '[']) {
         Some(0) if line.len() > max_length && line.starts_with('[') => "[...]".to_owned(),

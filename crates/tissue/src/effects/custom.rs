@@ -42,7 +42,7 @@ impl Custom {
     fn advance(&self, mut sample: EquationSample, dz_m: f64, memory: &mut EffectState) -> f64 {
         let definition = self.definition;
         if definition.uses_travel {
-            // At rest a measured position still jitters, which is no change of direction.
+            // Jitter of the measured position at rest must not count as a change of direction.
             let direction = sgn(sample.v_mps);
             if direction != 0.0 {
                 let before = if direction * memory[0] >= 0.0 { memory[0] } else { 0.0 };

@@ -223,10 +223,9 @@ effects! {
 }
 
 impl AnyEffect {
-    /// Whether every parameter makes sense physically.
+    /// Checks that every parameter is within its physical range.
     ///
-    /// # Errors
-    /// [`ParameterError`] with the first parameter that does not.
+    /// # Errors [`ParameterError`] with the first parameter that is not.
     pub fn check(&self) -> Result<(), ParameterError> {
         for (parameter, value) in self.info().parameters.iter().zip(self.parameters()) {
             let allowed = (parameter.low, parameter.high);

@@ -39,7 +39,7 @@ pub(super) const LAYER: ParameterInfo = ParameterInfo::shape("layer", "", "layer
     .search(1.0, 1.0, 10.0)
     .integer();
 
-/// The 1-based layer index of a parameter value. The cast saturates, and NaN becomes 0, which is no layer.
+/// The 1-based layer index of a parameter value. The cast saturates; NaN becomes 0, which is not a layer.
 pub(super) fn layer_index(value: f64) -> usize {
     libm::round(value) as usize
 }

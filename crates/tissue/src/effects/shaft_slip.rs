@@ -44,9 +44,9 @@ const MAX_ITERATIONS: usize = 80;
 /// Integrated implicitly, in steps of at most 0.15 mm, exact for steady sliding and for the relaxation
 /// (`crates/tissue/tests/shaft_slip.rs`). `m`, `b`, `g_j`, `tau_j` have no effect without `C` and `S`.
 ///
-/// Inactive: `C = 0` and `S = 0`. Signature: after a stop the force falls speed_factor and then stays; after a reversal it follows
-/// travel over millimetres; the sliding plateau hardly depends on speed. Source: power-law creep of dragged contacts
-/// (Persson 2000, section 12; Norton's law) with Maxwell relaxation; fitted to insertions into skin and muscle phantoms.
+/// Inactive: `C = 0` and `S = 0`. Signature: after a stop the force falls and then stays; after a reversal it follows travel over
+/// millimetres; the sliding plateau hardly depends on speed. Source: power-law creep of dragged contacts (Persson 2000, section
+/// 12; Norton's law) with Maxwell relaxation; fitted to insertions into skin and muscle phantoms.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct ShaftSlip {

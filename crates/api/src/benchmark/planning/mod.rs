@@ -38,7 +38,7 @@ impl PlanningBenchmark {
     }
 
     /// Simulates cases like `base` until `wanted` of them are open after one insertion, and gives each open case a second insertion. With
-    /// `from_journal` only the cases that the journal holds are used. `done` is called with the number of new open cases.
+    /// `from_journal` only the cases in the journal are used. `done` is called with the number of new open cases.
     pub fn run_row(&mut self, base: &CaseId, wanted: u64, from_journal: bool, done: &dyn Fn(u64)) {
         let mut cases: Vec<PlanningCase> = Vec::new();
         let (mut next, most) = (0, wanted * MAX_CASES_PER_OPEN_CASE);
@@ -67,7 +67,7 @@ impl PlanningBenchmark {
         self.rows.push((name, cases));
     }
 
-    /// The case from the journal, or else a new one.
+    /// The case from the journal; if it is not there, a new one.
     fn case(&self, id: &CaseId, from_journal: bool) -> Option<PlanningCase> {
         if let Some(known) = self.journal.completed.iter().find(|d| d.id == *id) {
             return Some(known.clone());

@@ -1,4 +1,4 @@
-//! One case: diagnosed after one insertion and, when that leaves the cause open, after a second one.
+//! One case: diagnosed after one insertion and, if the cause is then ambiguous, after a second one.
 
 use crate::benchmark::answer_question::{answer_question, assumed_scenario, named_recordings};
 use serde::{Deserialize, Serialize};

@@ -1,4 +1,4 @@
-//! Samples of the artefacts force that a force law cannot explain: at the end of the sensor's range, spikes, and a quantised
+//! Samples of the recorded force that a force law cannot explain: at the end of the sensor's range, spikes, and a quantised
 //! force at rest; with range, resolution and spikes of the sensor.
 //!
 //! Quality notes ([`QualityNote`]) inform the reader; these results are for fits.
@@ -13,7 +13,7 @@ use crate::recording::Recording;
 use range_and_resolution::{quantisation_step_n, sensor_limit_n};
 use spikes::find_spikes;
 
-/// Sensor artefacts in the artefacts force of a set of recordings.
+/// Sensor artefacts in the recorded force of a set of recordings.
 #[derive(Clone, Debug, Default)]
 pub struct SensorArtefacts {
     /// Per recording, the samples to exclude from a fit: saturated, spikes, or at rest within one step of the sensor.
@@ -26,7 +26,7 @@ pub struct SensorArtefacts {
     pub spikes: Option<Spikes>,
 }
 
-/// Finds range, resolution and spikes in the artefacts forces of recordings with these quality notes.
+/// Finds range, resolution and spikes of the sensor from the forces of recordings with these quality notes.
 #[must_use]
 pub fn find_sensor_artefacts(recordings: &[&Recording], notes: &[Vec<QualityNote>]) -> SensorArtefacts {
     let mut artefacts = SensorArtefacts {

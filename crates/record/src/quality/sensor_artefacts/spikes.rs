@@ -123,7 +123,8 @@ pub(super) fn find_spikes(recordings: &[&Recording], exclude: &mut [Vec<bool>], 
 }
 
 /// Keeps as many of the largest outliers as have one size and hardly any smaller ones between them and the noise; the outliers
-/// of heavy tails are no spikes. `smaller` are the sizes of samples below the threshold. Keeps none if no two have one size.
+/// of heavy tails do not count as spikes. `smaller` are the sizes of samples below the threshold. Keeps none if no two have
+/// one size.
 fn keep_one_size(found: &mut Vec<(usize, usize, f64)>, smaller: Vec<f64>) {
     let mut sizes: Vec<f64> = found.iter().map(|f| f.2).collect();
     sizes.sort_unstable_by(|a, b| b.total_cmp(a));

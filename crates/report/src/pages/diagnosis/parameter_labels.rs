@@ -1,4 +1,4 @@
-//! What the recordings say about each parameter, and how the estimates correlate.
+//! Identifiability of each parameter from the recordings, and correlations of the estimates.
 
 use crate::page_model::{Cell, Section, Status, Table};
 use crate::svg::{FigureOptions, HeatMap, heat_map};
@@ -9,7 +9,7 @@ use stylet_diagnose::diagnosis_json::{
 use stylet_stats::number_format::{p_value, significant};
 
 /// Parameters that these recordings do not determine, in one sentence. Those at their bounds and puncture forces that were never reached
-/// have sentences of their own.
+/// have separate sentences.
 #[must_use]
 pub fn undetermined_parameters(d: &Diagnosis) -> Option<String> {
     let has_own_sentence = |p: &&LabelledParameter| {
@@ -35,7 +35,7 @@ pub(crate) fn label_cell(
     Cell::text(p.label_in_words()).status(status)
 }
 
-/// The parameters of each recording alone side by side, and whether they are one; nothing for a single recording.
+/// Parameters fitted to each recording separately, and whether they agree; nothing for a single recording.
 pub(super) fn by_recording(d: &Diagnosis) -> Section {
     let section = Section::new("Each recording alone");
     if d.by_recording.is_empty() {

@@ -262,7 +262,7 @@ fn thin(f: &[f64], value: &[f64]) -> Vec<usize> {
     kept.into_iter().map(|k| k.1).collect()
 }
 
-/// What remains of the residual with the extended model.
+/// Residual with the extended model.
 pub(super) fn remaining_structure(d: &Diagnosis, all: &[RecordingCurves]) -> Section {
     let text = if d.residual_structure.p_value < 1e-3 {
         format!(

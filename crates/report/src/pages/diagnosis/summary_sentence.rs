@@ -23,7 +23,7 @@ pub fn findings(d: &Diagnosis) -> Vec<String> {
     d.findings.iter().filter(|f| f.kind != FindingKind::OutlierRecording).map(|f| f.message.clone()).collect()
 }
 
-/// What the best model beside an unmodelled force explains.
+/// Share explained by the best model in the presence of an unmodelled force.
 #[must_use]
 pub fn partial_model(d: &Diagnosis) -> Option<String> {
     let p = d.partial.as_ref()?;
@@ -104,7 +104,7 @@ fn verdict(d: &Diagnosis) -> String {
     }
 }
 
-/// Recordings whose force is unlike that of the others.
+/// Recordings whose force is an outlier among the others.
 fn outlier_recordings(d: &Diagnosis) -> Vec<&str> {
     let all = d.data_quality.iter().filter(|q| q.note.kind == QualityKind::OutlierRecording);
     all.map(|q| q.recording.as_str()).collect()
