@@ -28,7 +28,7 @@ pub struct RecordingCurves {
     pub used: Vec<bool>,
     /// Times in s at which layers ruptured.
     pub ruptures_s: Vec<f64>,
-    /// Active layer of every block, 1-based.
+    /// Layer of the tip in every block, 1-based; 0 before the surface.
     pub layer: Vec<usize>,
 }
 
@@ -56,6 +56,13 @@ pub fn recording_curves(examined: &DiagnosisResult) -> Vec<RecordingCurves> {
             let t: Vec<f64> = (0..b.len()).map(|k| 0.5 * (b.start_s[k] + b.end_s[k])).collect();
             let (position_m, velocity_mps) = t.iter().map(|t| b.motion.at(*t)).unzip();
             let ruptures = &best.model.rupture_times_s[r];
+            // In retraction the tip comes back through the layers that it has passed.
+            let layer_at = |t: &f64| {
+                let position_m = b.motion.at(*t).0;
+                let is_passed = |r: &&f64| **r <= *t && b.motion.at(**r).0 <= position_m;
+                let passed = ruptures.iter().filter(is_passed).count();
+                if passed == 0 && position_m < best.model.tissue.surface_m { 0 } else { 1 + passed }
+            };
             RecordingCurves {
                 force_n: b.force_n.clone(),
                 free_run_residual_n: predict_free_run(&best.model, data, r)
@@ -64,7 +71,7 @@ pub fn recording_curves(examined: &DiagnosisResult) -> Vec<RecordingCurves> {
                 extended_residual_n: best.residuals.residual_n[r].clone(),
                 used: b.used.clone(),
                 ruptures_s: ruptures.iter().copied().filter(|r| r.is_finite()).collect(),
-                layer: t.iter().map(|t| 1 + ruptures.iter().filter(|r| **r <= *t).count()).collect(),
+                layer: t.iter().map(layer_at).collect(),
                 time_s: t,
                 position_m,
                 velocity_mps,
@@ -86,7 +93,7 @@ pub fn rms_by_layer_and_phase(
         for (i, e) in pick(c).iter().enumerate().filter(|(i, _)| c.used[*i]) {
             let v = c.velocity_mps[i];
             let phase = if v > 1e-5 { 0 } else { 1 + usize::from(v < -1e-5) };
-            let row = if c.layer[i] == 1 && c.position_m[i] < 0.0 { 0 } else { c.layer[i].min(layers + 1) };
+            let row = c.layer[i].min(layers + 1);
             sums[row][phase].0 += e * e;
             sums[row][phase].1 += 1.0;
         }
@@ -186,7 +193,7 @@ mod tests {
         let mut all = vec![
             curve(1, 0.01, 0.002, 20, 0.3),
             curve(1, 0.01, 0.0, 19, 0.5),
-            curve(1, -0.01, -0.002, 30, 0.7),
+            curve(0, -0.01, -0.002, 30, 0.7),
             curve(2, 0.02, -2e-5, 25, 1.1),
             curve(3, 0.03, 5e-6, 40, 1.3),
             curve(9, 0.09, 2e-5, 22, 1.9),

@@ -84,7 +84,9 @@ impl ContactFinding {
     pub fn sentence(&self) -> String {
         let setting = format!("--contact {}", self.setting);
         let b = &self.baseline;
-        let pm = |value: f64, sd: f64, scale: f64| format!("{:.3} ± {:.2}", scale * value, scale * 1.96 * sd);
+        let pm = |value: f64, sd: f64, scale: f64| {
+            format!("{:.3} ± {:.2}", scale * value, scale * stylet_stats::normal::Z95 * sd)
+        };
         let drift = || pm(b.drift_n_per_s, b.sd[1], 1e3);
         let line = || pm(b.line_n_per_m, b.sd[2], 1.0);
         let steps = self.zero_steps.iter().filter(|s| !s.in_tissue).count();
@@ -252,7 +254,9 @@ impl ContactAssessor {
         let (contact_m, sd_m, probability) = self.last.unwrap_or_default();
         let [low, high] = self.span_m.unwrap_or_default();
         let estimated = setting == Contact::Detected && sd_m > 0.0;
-        let interval = contact_m.filter(|_| estimated).map(|z| [z - 1.96 * sd_m, z + 1.96 * sd_m]);
+        let interval = contact_m
+            .filter(|_| estimated)
+            .map(|z| [z - stylet_stats::normal::Z95 * sd_m, z + stylet_stats::normal::Z95 * sd_m]);
         let mut finding = ContactFinding {
             setting: setting.name(),
             hypothesis: self.baseline_hypothesis(),

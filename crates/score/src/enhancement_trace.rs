@@ -62,6 +62,8 @@ pub struct Trace {
     pub restarts: usize,
     /// Index of the first estimate since the last restart, after which layers are counted from 1 again.
     pub first_estimate: usize,
+    /// Index of the first rupture since the last restart.
+    pub first_detection: usize,
 }
 
 impl Trace {
@@ -156,12 +158,16 @@ impl Trace {
         if out.restarted {
             self.restarts += 1;
             self.first_estimate = self.estimates.len();
+            self.first_detection = self.detections.len();
         }
         if let Some(step) = out.zero_step {
             // A step of the zero that was first declared as a rupture.
             if let Some(layer) = step.withdrawn {
-                self.detections.retain(|d| d.layer != layer);
-                self.estimates.retain(|e| e.layer != layer);
+                // Layers are counted from 1 again after a restart.
+                let kept = self.detections.split_off(self.first_detection.min(self.detections.len()));
+                self.detections.extend(kept.into_iter().filter(|d| d.layer != layer));
+                let kept = self.estimates.split_off(self.first_estimate.min(self.estimates.len()));
+                self.estimates.extend(kept.into_iter().filter(|e| e.layer != layer));
             }
             self.zero_steps.push(step);
         }
@@ -289,5 +295,40 @@ pub fn model_name(model: Model) -> &'static str {
     match model {
         Model::KelvinVoigt => "kv",
         Model::MultiLayer => "ml",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Trace;
+    use stylet_core::{Cause, Detection, Output, ZeroStep};
+
+    #[test]
+    fn a_step_of_the_zero_withdraws_no_rupture_from_before_a_restart() {
+        let rupture = |time_s: f64| Detection {
+            layer: 1,
+            time_s,
+            position_m: 0.0,
+            located_s: time_s,
+            located_m: 0.0,
+            cause: Cause::Cusum,
+            drop_n: 0.0,
+            drop_sd_n: 0.0,
+            confidence: 1.0,
+        };
+        let step = ZeroStep {
+            time_s: 2.0,
+            position_m: 0.0,
+            size_n: 1.0,
+            sd_n: 0.1,
+            in_tissue: true,
+            withdrawn: Some(1),
+        };
+        let mut trace = Trace::default();
+        trace.record_events(&Output { detection: Some(rupture(1.0)), used: true, ..Output::default() });
+        trace.record_events(&Output { restarted: true, used: true, ..Output::default() });
+        trace.record_events(&Output { detection: Some(rupture(1.5)), used: true, ..Output::default() });
+        trace.record_events(&Output { zero_step: Some(step), used: true, ..Output::default() });
+        assert_eq!(trace.detections, [rupture(1.0)]);
     }
 }

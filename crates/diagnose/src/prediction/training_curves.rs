@@ -10,6 +10,8 @@ const SPEED_TOLERANCE: f64 = 0.1;
 const STROKE_TOLERANCE_M: f64 = 1e-3;
 /// Largest difference of the curves of one and the same recording, as a share of the largest force.
 const SAME_RECORDING_SHARE: f64 = 1e-5;
+/// Resolution in N of the stored curves.
+const STORED_STEP_N: f64 = 1e-6;
 
 /// A training recording.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -65,7 +67,7 @@ impl TrainingSummary {
         let largest_n = force_n.iter().flatten().fold(0.0_f64, |m, f| m.max(f.abs()));
         self.runs.iter().position(|run| {
             run.force_n.iter().zip(force_n).all(|pair| match pair {
-                (Some(a), Some(b)) => (a - b).abs() <= SAME_RECORDING_SHARE * largest_n,
+                (Some(a), Some(b)) => (a - b).abs() <= (SAME_RECORDING_SHARE * largest_n).max(STORED_STEP_N),
                 (None, None) => true,
                 _ => false,
             })

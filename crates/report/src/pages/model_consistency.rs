@@ -35,7 +35,11 @@ pub fn page(names: &[String; 2], c: &Consistency) -> Page {
             Cell::text(p.parameter.clone()),
             Cell::number(number(p.values[0])),
             Cell::number(number(p.values[1])),
-            Cell::number(format!("{} ± {}", number(p.values[1] - p.values[0]), number(1.96 * p.sd))),
+            Cell::number(format!(
+                "{} ± {}",
+                number(p.values[1] - p.values[0]),
+                number(stylet_stats::normal::Z95 * p.sd)
+            )),
             Cell::number(p_value(p.p_value)).status(if p.differs { Status::Warn } else { Status::Plain }),
         ]
     });
