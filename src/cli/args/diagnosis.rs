@@ -16,8 +16,8 @@ use stylet_api::DiagnosisInputs;
   stylet diagnose --data log1.csv log2.csv
 
 Writes report.html, diagnosis.json and extended.ron: the scenario with re-fitted parameters and the
-effects found, for `stylet run` (with --motion if the scenario says `Recorded`). The exit code is 0 whatever
-the verdict, 1 when `stylet check` calls the recordings unusable, 2 when an input is wrong.")]
+effects found, for `stylet run` (with --motion if the scenario says `Recorded`). The exit code is 0
+whatever the verdict, 1 when no recording touches the tissue, 2 when an input or a recording is wrong.")]
 pub struct DiagnoseArgs {
     /// Assumed scenario, or a data set of repeated insertions (RON). Without one the layers are those that
     /// the recordings show, as `stylet identify` finds them.
