@@ -241,4 +241,5 @@ def main():
     print(f"refit worse by more than 3 %: {worse} (each from the others), {worse_one} (after one recording)")
 
 
-main()
+if __name__ == "__main__":
+    main()
