@@ -164,10 +164,8 @@ impl Trace {
             // A step of the zero that was first declared as a rupture.
             if let Some(layer) = step.withdrawn {
                 // Layers are counted from 1 again after a restart.
-                let kept = self.detections.split_off(self.first_detection.min(self.detections.len()));
-                self.detections.extend(kept.into_iter().filter(|d| d.layer != layer));
-                let kept = self.estimates.split_off(self.first_estimate.min(self.estimates.len()));
-                self.estimates.extend(kept.into_iter().filter(|e| e.layer != layer));
+                remove_from(&mut self.detections, self.first_detection, |d| d.layer == layer);
+                remove_from(&mut self.estimates, self.first_estimate, |e| e.layer == layer);
             }
             self.zero_steps.push(step);
         }
@@ -277,6 +275,15 @@ pub fn score_run(
         }
     }
     (trace, score)
+}
+
+/// Removes the elements from index `first` on for which `is_removed` holds.
+fn remove_from<T>(all: &mut Vec<T>, first: usize, is_removed: impl Fn(&T) -> bool) {
+    let mut index = 0;
+    all.retain(|x| {
+        index += 1;
+        index <= first || !is_removed(x)
+    });
 }
 
 /// Short name of an algorithm, as in `paper/ml/force_torque`.
