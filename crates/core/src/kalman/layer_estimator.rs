@@ -312,7 +312,7 @@ impl LayerEstimator {
         }
         let slope = slope.min(max_slope(unit));
         let ruptured_friction = self.belief.x[B_PREV].max(0.0);
-        let b = self.belief.x[B].clamp(-slope / drive, slope / drive);
+        let b = at_least(-slope / drive, at_most(slope / drive, self.belief.x[B]));
         let stiffness = self.stiffness_rms(slope, unit);
         let mut map = [[0.0; N]; N];
         map[D][if first { K_PREV } else { D }] = 1.0;
@@ -336,7 +336,8 @@ impl LayerEstimator {
             before[2] = ruptured_friction;
         }
         if let Some(slot) = passed_layers.get_mut(self.passed_count) {
-            *slot = [position_m - d, position_m, 0.0];
+            // A rupture may be located just before the estimated start.
+            *slot = [position_m - at_least(0.0, d), position_m, 0.0];
         }
         self.start_m = position_m;
         (self.rupture_m, self.rupture_sd_m) = (position_m, sd_m);
@@ -350,7 +351,7 @@ impl LayerEstimator {
     /// Reverts the free-tip assumption after a drop: moves half of the slope, with that sd, from friction to stiffness.
     pub(super) fn reopen_split(&mut self, drive: f64, unit: f64) {
         let widest = max_slope(unit);
-        let half = (0.5 * self.slope(drive)).clamp(-widest, widest);
+        let half = at_least(-widest, at_most(widest, 0.5 * self.slope(drive)));
         let g = &mut self.belief;
         (g.x[K], g.x[B]) = (g.x[K] + half, g.x[B] - half / drive);
         let variance = half * half * unit;
@@ -447,7 +448,7 @@ impl LayerEstimator {
                 let later_m = (noise.bias_n() - g.x[BIAS]) / k;
                 let bound_m = 2.0 * self.start_sd_m;
                 let per_bias = g.x[B] / k;
-                friction += g.x[B] * later_m.clamp(-bound_m, bound_m);
+                friction += g.x[B] * at_least(-bound_m, at_most(bound_m, later_m));
                 variance += per_bias * (per_bias * g.p[BIAS][BIAS] - 2.0 * g.cov(BIAS, D));
             }
         }
@@ -489,7 +490,7 @@ impl LayerEstimator {
         for (i, [start, end, b]) in passed_layers.iter().take(count).enumerate() {
             let b = if i + 1 == self.passed_count { self.belief.x[B_PREV].max(0.0) } else { *b };
             whole += b * (end - start);
-            inside += b * (z_m - start).clamp(0.0, end - start);
+            inside += b * at_least(0.0, at_most(end - start, z_m - start));
         }
         // The sum is known better than its parts.
         let total = self.shaft_friction(deepest_m, noise).0.max(0.0);

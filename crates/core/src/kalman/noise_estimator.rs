@@ -80,7 +80,7 @@ impl NoiseEstimator {
         if self.interval_s == 0.0 {
             self.interval_s = dt_s;
         } else {
-            let bounded = dt_s.clamp(0.5 * self.interval_s, 2.0 * self.interval_s);
+            let bounded = at_least(0.5 * self.interval_s, at_most(2.0 * self.interval_s, dt_s));
             self.interval_s += 0.02 * (bounded - self.interval_s);
         }
     }

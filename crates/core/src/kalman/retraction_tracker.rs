@@ -3,6 +3,7 @@
 //! it.
 
 use super::force_predictor::MEMORY_M;
+use super::gaussian::{at_least, at_most};
 
 /// Travel over which a difference becomes friction, in m: a tip force decays as `exp(-x/2 mm)`.
 pub(super) const TRACKING_TRAVEL_M: f64 = 2e-3;
@@ -80,7 +81,7 @@ impl RetractionTracker {
         let memory = if residual < 0.0 { self.memory_m } else { PUSH_TRAVEL_RATIO * self.memory_m };
         self.offset_n += (1.0 - libm::exp(-travel / memory)) * residual;
         self.slope += travel / (self.memory_m * (SLOPE_TRAVEL_RATIO * self.memory_m)) * residual;
-        let bounded = residual.clamp(-sample.peak_force_n, sample.peak_force_n);
+        let bounded = at_least(-sample.peak_force_n, at_most(sample.peak_force_n, residual));
         self.residual_n2 += travel / (travel + self.memory_m) * (bounded * bounded - self.residual_n2);
         (friction, libm::sqrt(self.residual_n2))
     }

@@ -54,8 +54,8 @@ impl FrictionCompensation {
         self.layers[..self.count]
             .iter()
             .map(|layer| {
-                let inside = (z_m - layer.start_m).clamp(0.0, layer.thickness_m);
                 if layer.thickness_m > 0.0 {
+                    let inside = (z_m - layer.start_m).clamp(0.0, layer.thickness_m);
                     layer.added_friction_ns_per_m * inside / layer.thickness_m
                 } else {
                     0.0

@@ -316,6 +316,14 @@ fn during_retraction_friction_is_shared_among_the_layers() {
         (130.0 + 29.05) * 90.0 / 251.0,
         1e-9,
     );
+    // A rupture that is located before the start of its layer leaves a layer without length.
+    let mut reversed = passed_layers;
+    reversed[1] = [0.021, 0.020_997, 1.0];
+    near(
+        estimator.friction_during_retraction(&reversed, 0.011, 0.0345, &noise),
+        (130.0 + 29.05) * 90.0 / 180.0,
+        0.02,
+    );
     // Negative friction counts as zero; without any friction there is no scaling.
     estimator.tip_free = false;
     estimator.belief.x[B_PREV] = -3.0;
