@@ -5,7 +5,7 @@
 //! the baseline terms whose gain exceeds their BIC penalty; the better of both searches is kept.
 
 use crate::base_law_fit::{MISFIT_FACTOR, PreparedRecordings, fit_with_baseline};
-use crate::effect_selection::{Search, SearchStage};
+use crate::effect_selection::{MAX_EFFECTS, Search, SearchStage};
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use crate::random_effect_selection::select_random_effects;
 use crate::zero_steps::{
@@ -31,10 +31,13 @@ const MAX_EXCHANGES: usize = 3;
 
 /// Searches for effects from the base law and, if a baseline improves it, from the base law with the baseline. Returns the search with the
 /// better penalised likelihood, and the recordings it was fitted to.
+///
+/// With `single`, at most one effect is added, and a baseline only if it leaves nothing but noise; see [`continue_search`].
 pub(crate) fn search_with_baseline(
     prepared: &PreparedRecordings,
     base: Fit,
     data: FitData,
+    single: bool,
     progress: &mut impl FnMut(&str),
 ) -> (Search, PreparedRecordings) {
     progress("fitting the sensor's baseline");
@@ -43,9 +46,10 @@ pub(crate) fn search_with_baseline(
     let (from_base, baseline) = match first {
         Some(baseline) if is_dominant(&baseline) => (None, baseline),
         first => {
-            let from_base = Search::run(prepared, base.clone(), data.clone(), progress);
+            let start = Search::from_fit(base.clone(), data.clone());
+            let from_base = Search::run_from(start.limited(single), prepared, progress);
             // No second search if other effects leave only noise and the baseline alone does not.
-            let is_enough = first.is_none() && leaves_noise(&from_base.best, &from_base.data);
+            let is_enough = first.is_none() && (single || leaves_noise(&from_base.best, &from_base.data));
             let exchanged = || if is_enough { None } else { Baseline::fit(prepared, &base, &data, true) };
             let Some(baseline) = first.or_else(exchanged) else {
                 return (from_base, prepared.clone());
@@ -55,7 +59,7 @@ pub(crate) fn search_with_baseline(
     };
     let Baseline { prepared: with_steps, fit, data: data_of_baseline, stages } = baseline;
     let start = Search { base, stages, ..Search::from_fit(fit, data_of_baseline) };
-    let mut from_baseline = Search::run_from(start, &with_steps, progress);
+    let mut from_baseline = Search::run_from(start.limited(single), &with_steps, progress);
     remove_weak_steps(&mut from_baseline, NoiseSource::LongMemory);
     let Some(from_base) = from_base else {
         return (from_baseline, with_steps);
@@ -68,6 +72,16 @@ pub(crate) fn search_with_baseline(
     } else {
         (from_base, prepared.clone())
     }
+}
+
+/// Continues a search that was limited to a single effect.
+pub(crate) fn continue_search(
+    (found, prepared): (Search, PreparedRecordings),
+    progress: &mut impl FnMut(&str),
+) -> (Search, PreparedRecordings) {
+    let mut search = Search::run_from(Search { max_effects: MAX_EFFECTS, ..found }, &prepared, progress);
+    remove_weak_steps(&mut search, NoiseSource::LongMemory);
+    (search, prepared)
 }
 
 /// Recordings with their steps of the zero, fit, and data with the noise of the fit.
@@ -196,6 +210,12 @@ pub(crate) fn leaves_noise(f: &Fit, data: &FitData) -> bool {
 }
 
 impl Search {
+    /// The search, limited to one more effect if `single`.
+    fn limited(self, single: bool) -> Self {
+        let max_effects = if single { self.best.model.effects.len() + 1 } else { self.max_effects };
+        Self { max_effects, ..self }
+    }
+
     /// Removes baseline effects and steps whose gain is below their penalty; returns one selection step per remaining effect.
     fn prune_baseline(&mut self) -> Vec<SearchStage> {
         loop {

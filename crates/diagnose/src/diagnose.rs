@@ -1,6 +1,6 @@
 //! Diagnoses recordings: identifies the effects that the scenario lacks, with intervals and the improvement on held-out recordings.
 
-use crate::base_law_fit::{PreparedRecordings, assumptions_of};
+use crate::base_law_fit::{PreparedRecordings, assumptions_of, fit_base_law};
 use crate::check_json::{CheckItem, Light};
 use crate::claims::{self, Context, have_one_motion};
 use crate::competing_effects::{CompetingEffect, find_competing_effects};
@@ -8,7 +8,7 @@ use crate::diagnosis_json::*;
 use crate::error::DiagnoseError;
 use crate::experiment_check::{check_before_fit, effects_item, parameters_item};
 use crate::fast_tone_cause::{fast_tone_cause, mark_mains, tone_mean_square_n2, without_removed_tones};
-use crate::fast_tones::remove_fast_tones;
+use crate::fast_tones::{FastTone, remove_fast_tones};
 use crate::general_forms::mark_general_forms;
 use crate::held_out::{
     FreeRunResidual, JackknifeResult, held_out_residuals, jackknife_effects, pooled_rms,
@@ -18,7 +18,7 @@ use crate::identifiability::{advice, not_identifiable, visible_effects};
 use crate::input_checks::{
     CleanRecordings, NamedRecording, check_recordings, clean_recordings, force_outlier_notes,
 };
-use crate::measured_start::search_from_any_start;
+use crate::measured_start::{search_from, search_from_any_start};
 use crate::model_grade::grade;
 use crate::motion_period::common_motion_period_s;
 use crate::negligible_effects::{Negligible, negligible_effects};
@@ -30,8 +30,10 @@ use crate::verdict::{Assessment, assess_search, is_kept, move_negligible};
 use crate::zero_steps::{ZeroStepReport, zero_effects};
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::FitData;
-use stylet_record::QualityKind;
+use stylet_record::sensor_artefacts::SensorArtefacts;
+use stylet_record::{QualityKind, Recording};
 use stylet_scenario::Scenario;
 use stylet_stats::parallel::*;
 use stylet_tissue::Effect;
@@ -92,17 +94,9 @@ pub(crate) fn diagnose_given_layers(
     for (notes, outlier) in notes.iter_mut().zip(force_outlier_notes(&force_ratios)) {
         notes.extend(outlier);
     }
-    let tones = remove_fast_tones(&mut clean, &raw.exclude, BLOCK_S);
-    let assumptions = without_removed_tones(assumptions_of(scenario), &tones);
-    let one_motion = have_one_motion(&clean);
     progress("fitting the base law");
-    let blocks: Vec<BlockAverages> =
-        clean.par_iter().zip(&raw.exclude).map(|(r, x)| BlockAverages::new(r, x, BLOCK_S)).collect();
-    let prepared = PreparedRecordings::new(
-        Arc::new(assumptions),
-        blocks,
-        raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD,
-    );
+    let (prepared, tones) = prepare(scenario, &mut clean, &raw);
+    let one_motion = have_one_motion(&clean);
     let (mut search, prepared) =
         search_from_any_start(prepared, &clean, &mut progress).ok_or(DiagnoseError::NoFit)?;
     let mut competing = find_competing_effects(&mut search);
@@ -277,6 +271,33 @@ pub(crate) fn diagnose_given_layers(
         base_held_out,
         extended_held_out,
     })
+}
+
+/// Removes fast tones from recordings and divides them into blocks; returns the tones too.
+fn prepare(
+    scenario: &Scenario,
+    clean: &mut [Recording],
+    raw: &SensorArtefacts,
+) -> (PreparedRecordings, Vec<FastTone>) {
+    let tones = remove_fast_tones(clean, &raw.exclude, BLOCK_S);
+    let assumed = Arc::new(without_removed_tones(assumptions_of(scenario), &tones));
+    let blocks: Vec<BlockAverages> =
+        clean.par_iter().zip(&raw.exclude).map(|(r, x)| BlockAverages::new(r, x, BLOCK_S)).collect();
+    let quantisation_n = raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD;
+    (PreparedRecordings::new(assumed, blocks, quantisation_n), tones)
+}
+
+/// The best model with at most one effect, if it leaves only noise.
+pub(crate) fn simple_explanation(
+    scenario: &Scenario,
+    recordings: &[NamedRecording],
+    progress: &mut impl FnMut(&str),
+) -> Option<Fit> {
+    let CleanRecordings { mut recordings, raw, .. } = clean_recordings(recordings);
+    let (prepared, _) = prepare(scenario, &mut recordings, &raw);
+    let (base, data) = fit_base_law(&prepared)?;
+    let (search, _) = search_from(&prepared, base, data, true, progress);
+    search.leaves_noise(&search.best).then_some(search.best)
 }
 
 /// Labels and covariance of the base parameters and of effects that are causes.

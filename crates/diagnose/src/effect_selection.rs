@@ -10,7 +10,7 @@ use crate::motion_period::has_confounded_clock;
 use crate::random_effect_selection::select_random_effects;
 use crate::reweighted_fit::fit_reweighted;
 use crate::selection_restarts::{MAX_BEHIND_SHARE, is_new_effect};
-pub use crate::selection_state::{Search, SearchStage};
+pub use crate::selection_state::{MAX_EFFECTS, Search, SearchStage};
 use stylet_identify::evidence_nats::Nats;
 use stylet_identify::fit::{Effort, Fit, fit, fit_if_below};
 use stylet_identify::likelihood::{FitData, residuals};
@@ -19,8 +19,6 @@ use stylet_identify::score_test::ScoreTest;
 use stylet_stats::parallel::*;
 use stylet_tissue::ChainStage;
 
-/// Largest number of selected effects.
-pub const MAX_EFFECTS: usize = 5;
 /// Candidates that get a short fit.
 const SHORT_FITS: usize = 8;
 /// Candidates that get a full fit after the short one.
@@ -58,7 +56,7 @@ impl Search {
         loop {
             let count = search.best.model.effects.len();
             progress(&format!("searching for {} effect", if count == 0 { "an" } else { "another" }));
-            if count >= MAX_EFFECTS || !search.add_effect(prepared) {
+            if count >= search.max_effects || !search.add_effect(prepared) {
                 break;
             }
         }

@@ -1,7 +1,7 @@
 //! Determines the number of layers from the recordings, without a scenario or where they contradict it.
 
 use crate::claims;
-use crate::diagnose::{DiagnosisResult, Options, diagnose_given_layers};
+use crate::diagnose::{DiagnosisResult, Options, diagnose_given_layers, simple_explanation};
 use crate::diagnosis_json::{Diagnosis, Finding, FindingKind, Verdict};
 use crate::error::DiagnoseError;
 use crate::found_tissue::FoundTissue;
@@ -9,6 +9,7 @@ use crate::input_checks::{CleanRecordings, NamedRecording, check_length, clean_r
 use stylet_identify::model::Assumptions;
 use stylet_scenario::{Motion, Scenario};
 use stylet_score::MIN_FORCE_SHARE;
+use stylet_tissue::Tissue;
 
 /// Finds the layers that recordings show (`layers` of them, or all) and diagnoses the recordings with them under weak priors. Returns the
 /// scenario at the start and the diagnosis.
@@ -33,8 +34,9 @@ pub fn identify(
     diagnose_without_empty_layer(scenario, recordings, options, &mut progress)
 }
 
-/// Compares recordings with the prediction of a scenario. If findings contradict the result, the diagnosis is repeated with the number of
-/// layers in the recordings; that result is returned, with a finding, if no finding contradicts it.
+/// Compares recordings with the prediction of a scenario. If findings contradict the result, and another number of layers with at most one
+/// effect leaves only noise, the diagnosis is repeated with those layers; that result is returned, with a finding, if no finding
+/// contradicts it.
 ///
 /// # Errors
 /// [`DiagnoseError`] when the recordings do not fit the scenario.
@@ -48,30 +50,19 @@ pub fn diagnose(
     let is_contradicted = |d: &Diagnosis| {
         d.verdict == Verdict::Unknown || d.findings.iter().any(|f| claims::contradicts(f.kind))
     };
-    let assumed = scenario.tissue.layers.len();
     if !is_contradicted(&result.diagnosis) {
         return Ok(result);
     }
-    // Of an equal number of layers, the last may still turn out to be empty.
-    let is_other = |found: &Scenario| {
-        found.tissue.layers.len() != assumed || result.diagnosis.verdict != Verdict::Unknown
-    };
-    let found = scenario_from_recordings(&scenario.name, recordings, None).ok().filter(is_other);
-    let Some(found) = found else { return Ok(result) };
+    progress("looking for another number of layers");
+    let Some(start) = other_layers(scenario, recordings, &mut progress) else { return Ok(result) };
     progress("starting again with the layers in the data");
     let (tolerance, thickness_tolerance) = (scenario.tolerance, scenario.thickness_tolerance);
-    let start = Scenario {
-        tissue: found.tissue,
-        tolerance: found.tolerance,
-        thickness_tolerance: found.thickness_tolerance,
-        ..scenario.clone()
-    };
     // If the diagnosis with other layers fails, the first result remains valid.
     let Ok((start, mut other)) = diagnose_without_empty_layer(start, recordings, options, &mut progress)
     else {
         return Ok(result);
     };
-    let count = start.tissue.layers.len();
+    let (count, assumed) = (start.tissue.layers.len(), scenario.tissue.layers.len());
     if is_contradicted(&other.diagnosis) || count == assumed {
         return Ok(result);
     }
@@ -88,6 +79,26 @@ pub fn diagnose(
     Ok(other)
 }
 
+/// The scenario with the layers that the recordings show; `None` if these are as many as assumed, or leave more than noise with a single
+/// effect.
+fn other_layers(
+    scenario: &Scenario,
+    recordings: &[NamedRecording],
+    progress: &mut impl FnMut(&str),
+) -> Option<Scenario> {
+    let Scenario { tissue, tolerance, thickness_tolerance, .. } =
+        scenario_from_recordings(&scenario.name, recordings, None).ok()?;
+    let mut other = Scenario { tissue, tolerance, thickness_tolerance, ..scenario.clone() };
+    loop {
+        let fit = simple_explanation(&other, recordings, progress)?;
+        let count = other.tissue.layers.len();
+        if count == 1 || bears_force(&fit.model.tissue, recordings) {
+            return (count != scenario.tissue.layers.len()).then_some(other);
+        }
+        other.tissue.layers.truncate(count - 1);
+    }
+}
+
 /// Diagnoses, and repeats the diagnosis without the last layer as long as that carries no force.
 fn diagnose_without_empty_layer(
     mut scenario: Scenario,
@@ -98,7 +109,7 @@ fn diagnose_without_empty_layer(
     loop {
         let result = diagnose_given_layers(&scenario, recordings, options, &mut *progress)?;
         let count = scenario.tissue.layers.len();
-        if count == 1 || bears_force(&result, recordings) {
+        if count == 1 || bears_force(&result.search.best.model.tissue, recordings) {
             return Ok((scenario, result));
         }
         progress("again without the last layer, which bears no force");
@@ -107,8 +118,7 @@ fn diagnose_without_empty_layer(
 }
 
 /// Whether the last layer's elastic force at the deepest point is a noticeable share of the largest force.
-fn bears_force(result: &DiagnosisResult, recordings: &[NamedRecording]) -> bool {
-    let tissue = &result.search.best.model.tissue;
+fn bears_force(tissue: &Tissue, recordings: &[NamedRecording]) -> bool {
     let Some(last) = tissue.layers.len().checked_sub(1) else { return true };
     let largest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let over_all = |f: fn(&NamedRecording) -> &[f64]| {

@@ -1,7 +1,7 @@
 //! Chooses between start values from the scenario and start values from the data, for scenarios whose parameters are a rough guess.
 
 use crate::base_law_fit::{PreparedRecordings, fit_base_law, refit_with_random_effects};
-use crate::baseline_search::{leaves_noise, search_with_baseline};
+use crate::baseline_search::{continue_search, leaves_noise, search_with_baseline};
 use crate::found_tissue::FoundTissue;
 use crate::random_effect_selection::select_random_effects;
 use crate::selection_state::Search;
@@ -21,10 +21,11 @@ const BETTER_FACTOR: f64 = 2.0;
 ///
 /// 1. Only A is searched if its base law leaves only noise, if no layers are found in the data, if the base law from D is within
 ///    tolerance of A, or if its RMS residual is larger by [`BETTER_FACTOR`].
-/// 2. D is searched first if its base law leaves only noise, if its RMS residual is smaller by [`BETTER_FACTOR`], or if it is smaller at
-///    all and the fit from A is out of tolerance. Otherwise A is first.
-/// 3. The first search is returned if it leaves only noise and is within tolerance (A), or out of tolerance with at most one effect (D).
-/// 4. Otherwise both are searched. The one that leaves only noise is returned; of two, the one with fewer effects (if equal: A, unless it
+/// 2. Both are searched for a single effect. D is first if its base law leaves only noise, if its RMS residual is smaller by
+///    [`BETTER_FACTOR`], or if it is smaller at all and the fit from A is out of tolerance. The first one that leaves only noise and ends
+///    on its side of the tolerance (A within, D out of it) is continued and returned.
+/// 3. Otherwise A is searched; if A is first, leaves only noise and is within tolerance, it is returned.
+/// 4. Otherwise D is searched too. The one that leaves only noise is returned; of two, the one with fewer effects (if equal: A, unless it
 ///    is out of tolerance); of none, A, unless the RMS residual of D is smaller by [`BETTER_FACTOR`].
 pub(crate) fn search_from_any_start(
     prepared: PreparedRecordings,
@@ -36,24 +37,34 @@ pub(crate) fn search_from_any_start(
     let ratio = |fit: &Fit, data_of_fit: &FitData| base.rms_n(&data) / fit.rms_n(data_of_fit);
     let measured = measured.filter(|(_, fit, data_of_fit)| ratio(fit, data_of_fit) * BETTER_FACTOR > 1.0);
     let Some((measured, fit, data_of_fit)) = measured else {
-        return Some(search(&prepared, base, data, progress));
+        return Some(search_from(&prepared, base, data, false, progress));
     };
     let ratio = ratio(&fit, &data_of_fit);
     let explains = |found: &Search| found.leaves_noise(&found.best);
     let count = |found: &Search| found.best.model.effects.len();
     let is_out = |fit: &Fit| is_out_of_tolerance(&prepared.assumed, fit);
-    let from_data = |progress: &mut _| search(&measured, fit.clone(), data_of_fit.clone(), progress);
-    let from_assumed = |progress: &mut _| search(&prepared, base.clone(), data.clone(), progress);
     let data_first =
         leaves_noise(&fit, &data_of_fit) || ratio > BETTER_FACTOR || (ratio > 1.0 && is_out(&base));
-    let first = if data_first { from_data(progress) } else { from_assumed(progress) };
-    let has_at_most_one = count(&first.0) <= 1;
-    if explains(&first.0) && is_out(&first.0.best) == data_first && (has_at_most_one || !data_first) {
-        return Some(first);
+    let from = |data_start: bool, single: bool, progress: &mut _| {
+        if data_start {
+            search_from(&measured, fit.clone(), data_of_fit.clone(), single, progress)
+        } else {
+            search_from(&prepared, base.clone(), data.clone(), single, progress)
+        }
+    };
+    for data_start in [data_first, !data_first] {
+        let found = from(data_start, true, progress);
+        if explains(&found.0) && is_out(&found.0.best) == data_start {
+            return Some(continue_search(found, progress));
+        }
+    }
+    progress("searching for several effects");
+    let assumed = from(false, false, progress);
+    if !data_first && explains(&assumed.0) && !is_out(&assumed.0.best) {
+        return Some(assumed);
     }
     progress("searching from other numbers");
-    let (assumed, data) =
-        if data_first { (from_assumed(progress), first) } else { (first, from_data(progress)) };
+    let data = from(true, false, progress);
     let rms_n = |found: &Search| found.best.rms_n(&found.data);
     let is_data_better = match (explains(&assumed.0), explains(&data.0)) {
         (true, true) if is_out(&assumed.0.best) => count(&data.0) <= count(&assumed.0),
@@ -64,16 +75,17 @@ pub(crate) fn search_from_any_start(
     Some(if is_data_better { data } else { assumed })
 }
 
-/// Selects random effects and searches for effects from a fit of the base law; returns the search and the recordings it was fitted to.
-fn search(
+/// Selects random effects and searches for effects, or for a `single` one, from a fit of the base law; returns the search and the recordings it was fitted to.
+pub(crate) fn search_from(
     prepared: &PreparedRecordings,
     base: Fit,
     data: FitData,
+    single: bool,
     progress: &mut impl FnMut(&str),
 ) -> (Search, PreparedRecordings) {
     let (base, data) = select_random_effects(base, data);
     let (base, data) = refit_with_random_effects(prepared, base, data);
-    search_with_baseline(prepared, base, data, progress)
+    search_with_baseline(prepared, base, data, single, progress)
 }
 
 /// The base law fitted from the layers found in the data; `None` if there are none, or if it is within tolerance of the assumed parameters.
