@@ -107,14 +107,7 @@ pub(crate) fn diagnose_given_layers(
     let mut unweighted: Vec<(&str, JackknifeResult)> = Vec::new();
     if assessment.unknown && recordings.len() > 1 {
         progress("reweighting for an unmodelled effect");
-        let mut reweighted = search.continue_reweighted(&prepared);
-        if let Some(better) = reweighted.as_ref().and_then(|r| search.adopt_if_better(r, &prepared)) {
-            search = better;
-            competing = find_competing_effects(&mut search);
-            assessment = assess_search(&mut search, &competing);
-            reweighted = if assessment.unknown { search.continue_reweighted(&prepared) } else { None };
-        }
-        if let Some(mut reweighted) = reweighted {
+        if let Some(mut reweighted) = search.continue_reweighted(&prepared) {
             let results = jackknife_effects(&search.best, &search.data, sample_noise_sd_n(&search.data));
             unweighted = search.best.model.effects.iter().map(|e| e.info.id).zip(results).collect();
             competing = find_competing_effects(&mut reweighted);

@@ -5,7 +5,6 @@ use crate::effect_start::EffectStart;
 use crate::effect_start_values::effect_starts;
 use crate::geometry_selection::fix_geometry;
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
-use crate::model_pruning::{required_gain_nats, special_case_first};
 use crate::motion_period::has_confounded_clock;
 use crate::random_effect_selection::select_random_effects;
 use crate::reweighted_fit::fit_reweighted;
@@ -83,23 +82,6 @@ impl Search {
         Some(search)
     }
 
-    /// This search with the model of `other`, if that model is better on all data with equal weights.
-    #[must_use]
-    pub fn adopt_if_better(&self, other: &Self, prepared: &PreparedRecordings) -> Option<Self> {
-        let model = with_updated_times(other.best.model.clone(), &self.data, &prepared.drop_times());
-        let f = fit(&model, &self.data, Effort::FULL)?;
-        let needed = required_gain_nats(&self.best, &f, &self.data);
-        if self.best.nats() - f.nats() < needed
-            || !likelihood_gain(&self.best, &f, &self.data).exceeds(needed)
-        {
-            return None;
-        }
-        let mut search =
-            Self { stages: other.stages.clone(), ..self.with_best(self.best.clone(), self.data.clone()) };
-        search.accept(f);
-        Some(search)
-    }
-
     /// One selection step; returns whether an effect was added.
     pub(crate) fn add_effect(&mut self, prepared: &PreparedRecordings) -> bool {
         self.update_tones();
@@ -132,7 +114,7 @@ impl Search {
             required_nats: full.first().map_or(0.0, |f| self.required_nats(f)),
             choices: full.iter().filter_map(|f| f.model.effects.last().cloned()).collect(),
         };
-        for f in special_case_first(full, &self.data).into_iter().take(2) {
+        for f in full.into_iter().take(2) {
             let needed = self.required_nats(&f);
             if self.best.nats() - f.nats() < needed {
                 continue;

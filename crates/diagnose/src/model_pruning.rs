@@ -1,4 +1,4 @@
-//! Simplifies and extends a selected model: removes superfluous effects, prefers special cases, and tries extended forms.
+//! Simplifies and extends a selected model: removes superfluous effects and tries extended forms.
 
 use crate::base_law_fit::with_updated_times;
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
@@ -72,23 +72,6 @@ impl Search {
             }
         }
     }
-}
-
-/// Moves a special case of the leading candidate before it, unless the gain of the additional parameters exceeds their penalty under the
-/// noise of the larger model and none is at a bound.
-pub(crate) fn special_case_first(mut full: Vec<Fit>, data: &FitData) -> Vec<Fit> {
-    let Some(leader) = full.first() else { return full };
-    let id = leader.model.effects.last().map_or("", |e| e.info.id);
-    let special = |f: &Fit| f.model.effects.last().is_some_and(|e| e.info.nested_in.contains(&id));
-    let Some(k) = full.iter().position(special) else { return full };
-    let last = leader.model.effects.len().saturating_sub(1);
-    if effect_at_bound(leader, last)
-        || likelihood_gain(&full[k], leader, data) < Nats::new(required_gain_nats(&full[k], leader, data))
-    {
-        let f = full.remove(k);
-        full.insert(0, f);
-    }
-    full
 }
 
 /// Gain (nats) required of the additional parameters of `larger`.
