@@ -190,6 +190,7 @@ fn may_pay(infos: &[&'static EffectInfo], base: &Fit, data: &FitData) -> bool {
     infos.par_iter().map(is_needed).into_iter().any(|needed| needed)
 }
 
+/// Whether a fit leaves only noise.
 pub(crate) fn leaves_noise(f: &Fit, data: &FitData) -> bool {
     let calm = data.with_estimated_noise(&f.residuals.residual_n, NoiseSource::Detrended);
     f.rms_n(data) < MISFIT_FACTOR * calm.noise.sd_n()
