@@ -24,6 +24,7 @@
 pub mod autoregressive;
 pub mod confidence_interval;
 pub mod interpolation;
+pub mod least_squares;
 pub mod linear_algebra;
 pub mod moments;
 pub mod normal;
