@@ -1,7 +1,6 @@
 //! State of the effect selection: the current model with its noise, and the steps so far.
 
-use crate::base_law_fit::COARSENING_FACTOR;
-use crate::baseline_search::leaves_noise;
+use crate::base_law_fit::{COARSENING_FACTOR, leaves_noise};
 use crate::tone_detection::{detect_tones, with_noise_without_tones};
 use stylet_identify::delay_refinement::refine_delay;
 use stylet_identify::fit::{Effort, Fit, fit, fit_from_zero_scatter};
