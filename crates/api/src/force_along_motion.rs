@@ -23,7 +23,8 @@ pub fn force_along_motion(scenario: &Scenario, motion: &Recording) -> Result<Vec
     let mut before: Option<(f64, f64)> = None;
     let mut force_n = Vec::with_capacity(motion.len());
     for s in motion.samples() {
-        let (position_m, velocity_mps) = (chain.true_position(s.position_m), chain.true_position(s.velocity_mps));
+        let (position_m, velocity_mps) =
+            (chain.true_position(s.position_m), chain.true_position(s.velocity_mps));
         let acceleration_mps2 = before.map_or(0.0, |(t, v)| (velocity_mps - v) / (s.time_s - t));
         before = Some((s.time_s, velocity_mps));
         let force = law.step(&mut state, s.time_s, position_m, velocity_mps, &mut |_| {});
