@@ -10,7 +10,7 @@ use stylet_api::{
 };
 use stylet_report::pages::formatting::significant_or_dash;
 use stylet_report::pages::prediction::{
-    group_sentence, refit_sentence, summary_sentence, worse_than_baseline,
+    group_sentence, refit_sentence, summary_sentence, training_sentence, worse_than_baseline,
 };
 use stylet_report::significant;
 use stylet_scenario::Scenario;
@@ -72,7 +72,8 @@ fn varying_factors(args: &PredictArgs) -> Option<Vec<Factor>> {
 
 fn summary(p: &Prediction) -> String {
     let mut out = format!("{}\n{}\n", summary_sentence(p), group_sentence(p));
-    for line in refit_sentence(p).into_iter().chain(worse_than_baseline(p)) {
+    let lines = refit_sentence(p).into_iter().chain(training_sentence(p)).chain(worse_than_baseline(p));
+    for line in lines {
         let _ = writeln!(out, "{line}");
     }
     let _ = writeln!(

@@ -3,6 +3,7 @@
 use crate::config::{Algorithm, EnhanceConfig, Model};
 use crate::kalman::KalmanEnhancer;
 use crate::paper::PaperEnhancer;
+use crate::paper::sample_ring::SampleRing;
 use crate::sample::{Output, Sample, UnusedReason};
 use crate::sample_clock::{SampleClock, Verdict};
 use crate::units::Units;
@@ -17,16 +18,23 @@ const BLOCK_SAMPLES: usize = 64;
 /// - `Paper`, `Literal`: one RLS update, at most [`DropConfig::replay_per_tick`](crate::config::DropConfig::replay_per_tick)
 ///   replayed samples, and at each rupture a search over at most 256 earlier samples. The storage `B` (a `Vec<Sample>` or an
 ///   array) is a ring buffer of the active layer's raw samples for its replay; the oldest are overwritten.
-/// - `Stylet`: two small Kalman updates, no replay. The storage is not used and may be an empty array.
+/// - `Stylet`: two small Kalman updates, no replay. The storage is dropped and may be an empty array.
 #[derive(Clone, Debug)]
 pub struct Enhancer<B> {
-    paper: PaperEnhancer<B>,
-    kalman: Option<KalmanEnhancer>,
+    core: Core<B>,
     clock: SampleClock,
     surface_m: f64,
     units: Units,
     /// Last output converted to m and N; used only if `units` are not SI.
     converted: Output,
+}
+
+/// The algorithm that runs.
+#[derive(Clone, Debug)]
+#[expect(clippy::large_enum_variant, reason = "one per enhancer, and the core does not allocate")]
+enum Core<B> {
+    Paper { paper: PaperEnhancer, ring: SampleRing<B> },
+    Stylet { kalman: KalmanEnhancer, config: EnhanceConfig },
 }
 
 impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
@@ -40,22 +48,28 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     /// are in `units`; samples, surface and outputs are in m and N.
     pub fn with_units(config: EnhanceConfig, surface_m: f64, units: Units, storage: B) -> Self {
         let surface_m = surface_m / units.length_m;
-        let kalman =
-            (config.active_algorithm() == Algorithm::Stylet).then(|| KalmanEnhancer::new(&config, surface_m));
-        Self {
-            paper: PaperEnhancer::new(config, surface_m, storage),
-            kalman,
-            clock: SampleClock::default(),
-            surface_m,
-            units,
-            converted: Output::default(),
-        }
+        let core = if config.active_algorithm() == Algorithm::Stylet {
+            Core::Stylet { kalman: KalmanEnhancer::new(&config, surface_m), config }
+        } else {
+            Core::Paper { paper: PaperEnhancer::new(config, surface_m), ring: SampleRing::new(storage) }
+        };
+        Self { core, clock: SampleClock::default(), surface_m, units, converted: Output::default() }
     }
 
     /// The active configuration.
     #[must_use]
     pub fn config(&self) -> &EnhanceConfig {
-        self.paper.config()
+        match &self.core {
+            Core::Paper { paper, .. } => paper.config(),
+            Core::Stylet { config, .. } => config,
+        }
+    }
+
+    fn kalman(&self) -> Option<&KalmanEnhancer> {
+        match &self.core {
+            Core::Paper { .. } => None,
+            Core::Stylet { kalman, .. } => Some(kalman),
+        }
     }
 
     /// Processes one sample. A sample that is not finite, out of range, or not later than the previous one is ignored
@@ -75,9 +89,9 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
 
     #[inline]
     fn complete(&mut self, sample: &Sample) -> Output {
-        match &mut self.kalman {
-            Some(kalman) => *kalman.complete_output(sample),
-            None => *self.paper.complete_output(sample),
+        match &mut self.core {
+            Core::Paper { paper, .. } => *paper.complete_output(sample),
+            Core::Stylet { kalman, .. } => *kalman.complete_output(sample),
         }
     }
 
@@ -107,9 +121,9 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             Verdict::Ignore(why) => self.ignore(why),
             Verdict::Restart => self.restart(sample),
             Verdict::Use => {
-                let out = match &mut self.kalman {
-                    Some(kalman) => kalman.step(self.paper.config(), self.surface_m, sample),
-                    None => self.paper.step_brief(sample),
+                let out = match &mut self.core {
+                    Core::Paper { paper, ring } => paper.step_brief(ring, sample),
+                    Core::Stylet { kalman, config } => kalman.step(config, self.surface_m, sample),
                 };
                 if !out.used {
                     // The algorithm refuses samples that are almost simultaneous; the clock must not count them.
@@ -131,20 +145,19 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
             }
             return &self.converted;
         }
-        if self.kalman.is_some() {
-            for sample in samples {
-                each(self.step_brief(*sample));
-            }
-            return self.output();
-        }
         for block in samples.chunks(BLOCK_SAMPLES) {
             let mut clock = self.clock;
-            if block.iter().all(|s| s.is_usable() && clock.check(s.time_s) == Verdict::Use) {
-                self.clock = clock;
-                self.paper.run(block, &mut each);
-            } else {
-                for sample in block {
-                    each(self.step_brief(*sample));
+            match &mut self.core {
+                Core::Paper { paper, ring }
+                    if block.iter().all(|s| s.is_usable() && clock.check(s.time_s) == Verdict::Use) =>
+                {
+                    self.clock = clock;
+                    paper.run(ring, block, &mut each);
+                }
+                _ => {
+                    for sample in block {
+                        each(self.step_brief(*sample));
+                    }
                 }
             }
         }
@@ -153,9 +166,9 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
 
     #[inline(always)]
     fn check(&mut self, sample: &Sample) -> Verdict {
-        let usable = match &self.kalman {
-            Some(_) => KalmanEnhancer::is_usable(sample),
-            None => sample.is_usable(),
+        let usable = match &self.core {
+            Core::Paper { .. } => sample.is_usable(),
+            Core::Stylet { .. } => KalmanEnhancer::is_usable(sample),
         };
         if usable {
             self.clock.check(sample.time_s)
@@ -166,32 +179,33 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
 
     #[cold]
     fn ignore(&mut self, why: UnusedReason) -> &Output {
-        match &mut self.kalman {
-            Some(kalman) => kalman.ignore(why),
-            None => self.paper.ignore(why),
+        match &mut self.core {
+            Core::Paper { paper, .. } => paper.ignore(why),
+            Core::Stylet { kalman, .. } => kalman.ignore(why),
         }
     }
 
     #[cold]
     fn restart(&mut self, sample: Sample) -> &Output {
-        match &mut self.kalman {
-            Some(kalman) => {
-                *kalman = KalmanEnhancer::new(self.paper.config(), self.surface_m);
-                kalman.step(self.paper.config(), self.surface_m, sample);
-                kalman.mark_restarted()
+        match &mut self.core {
+            Core::Paper { paper, ring } => {
+                paper.restart(self.surface_m);
+                ring.clear();
+                paper.step_brief(ring, sample);
+                paper.mark_restarted()
             }
-            None => {
-                self.paper.restart(self.surface_m);
-                self.paper.step_brief(sample);
-                self.paper.mark_restarted()
+            Core::Stylet { kalman, config } => {
+                *kalman = KalmanEnhancer::new(config, self.surface_m);
+                kalman.step(config, self.surface_m, sample);
+                kalman.mark_restarted()
             }
         }
     }
 
     fn output(&self) -> &Output {
-        match &self.kalman {
-            Some(kalman) => kalman.output(),
-            None => self.paper.output(),
+        match &self.core {
+            Core::Paper { paper, .. } => paper.output(),
+            Core::Stylet { kalman, .. } => kalman.output(),
         }
     }
 
@@ -201,9 +215,8 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     /// force ([`StyletConfig::track_retraction`](crate::config::StyletConfig::track_retraction)). `None` with the other
     /// algorithms.
     pub fn apply_model_friction(&mut self, friction_n: f64) -> Option<(f64, [f64; 2])> {
-        let config = self.paper.config();
         let unit_n = self.units.force_n;
-        let kalman = self.kalman.as_mut()?;
+        let Core::Stylet { kalman, config } = &mut self.core else { return None };
         let (enhanced_n, band) = kalman.apply_model_friction(config, friction_n / unit_n)?;
         Some((unit_n * enhanced_n, band.map(|n| unit_n * n)))
     }
@@ -212,19 +225,19 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     /// filters that become invalid.
     #[must_use]
     pub fn is_numerically_valid(&self) -> bool {
-        self.kalman.as_ref().is_none_or(KalmanEnhancer::is_numerically_valid)
+        self.kalman().is_none_or(KalmanEnhancer::is_numerically_valid)
     }
 
     /// Internal state as text.
     #[doc(hidden)]
     #[must_use]
     pub fn debug_state(&self) -> alloc::string::String {
-        alloc::format!("{:?}", self.kalman)
+        alloc::format!("{:?}", self.kalman())
     }
 
     /// Multiplications and additions that `Stylet` did for the last sample; zero with the other algorithms.
     #[must_use]
     pub fn operation_count(&self) -> u32 {
-        self.kalman.as_ref().map_or(0, KalmanEnhancer::operation_count)
+        self.kalman().map_or(0, KalmanEnhancer::operation_count)
     }
 }

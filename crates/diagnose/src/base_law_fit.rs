@@ -99,6 +99,12 @@ pub(crate) const COARSENING_FACTOR: usize = 3;
 /// Largest share of the objective that a coarse refit with random effects may leave for a full refit to follow.
 const MAX_OBJECTIVE_SHARE: f64 = 0.5;
 
+/// Whether a fit leaves only noise.
+pub(crate) fn leaves_noise(f: &Fit, data: &FitData) -> bool {
+    let calm = data.with_estimated_noise(&f.residuals.residual_n, NoiseSource::Detrended);
+    f.rms_n(data) < MISFIT_FACTOR * calm.noise.sd_n()
+}
+
 /// Effort of coarse fits and of the first rounds of a full one.
 const COARSE_EFFORT: Effort = Effort { max_iterations: 5, min_gain_nats: 0.3 };
 

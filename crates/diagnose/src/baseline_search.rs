@@ -4,7 +4,7 @@
 //! shifts the surface, and a search from there stays in that local minimum. The effect search therefore also starts from the base law with
 //! the baseline terms whose gain exceeds their BIC penalty; the better of both searches is kept.
 
-use crate::base_law_fit::{MISFIT_FACTOR, PreparedRecordings, fit_with_baseline};
+use crate::base_law_fit::{PreparedRecordings, fit_with_baseline, leaves_noise};
 use crate::effect_selection::{MAX_EFFECTS, Search, SearchStage};
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use crate::random_effect_selection::select_random_effects;
@@ -202,11 +202,6 @@ fn may_pay(infos: &[&'static EffectInfo], base: &Fit, data: &FitData) -> bool {
         })
     };
     infos.par_iter().map(is_needed).into_iter().any(|needed| needed)
-}
-
-pub(crate) fn leaves_noise(f: &Fit, data: &FitData) -> bool {
-    let calm = data.with_estimated_noise(&f.residuals.residual_n, NoiseSource::Detrended);
-    f.rms_n(data) < MISFIT_FACTOR * calm.noise.sd_n()
 }
 
 impl Search {

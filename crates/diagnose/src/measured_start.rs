@@ -1,7 +1,7 @@
 //! Chooses between start values from the scenario and start values from the data, for scenarios whose parameters are a rough guess.
 
-use crate::base_law_fit::{PreparedRecordings, fit_base_law, refit_with_random_effects};
-use crate::baseline_search::{continue_search, leaves_noise, search_with_baseline};
+use crate::base_law_fit::{PreparedRecordings, fit_base_law, leaves_noise, refit_with_random_effects};
+use crate::baseline_search::{continue_search, search_with_baseline};
 use crate::found_tissue::FoundTissue;
 use crate::random_effect_selection::select_random_effects;
 use crate::selection_state::Search;

@@ -8,6 +8,12 @@ use stylet_identify::noise::NoiseSource;
 /// Smallest gain (nats) of an effect above its BIC penalty; it accounts for the choice among all candidates.
 pub const MIN_GAIN_NATS: f64 = 4.0;
 
+/// Confidence (0 to 1) in a cause that gains `surplus_nats` more than its penalty; `competitors` is the sum of the likelihoods of the
+/// effects that compete with it, relative to its own.
+pub(crate) fn confidence(surplus_nats: f64, competitors: f64) -> f64 {
+    1.0 / (1.0 + competitors + libm::exp(-surplus_nats.clamp(-30.0, 30.0) - 3.0))
+}
+
 /// Gain in nats of `larger` over `smaller`, both fitted under the noise estimated from the residual of `larger`.
 #[must_use]
 pub fn likelihood_gain(smaller: &Fit, larger: &Fit, data: &FitData) -> Nats<UnderLargerModelNoise> {

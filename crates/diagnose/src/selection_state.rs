@@ -1,6 +1,6 @@
 //! State of the effect selection: the current model with its noise, and the steps so far.
 
-use crate::base_law_fit::{COARSENING_FACTOR, MISFIT_FACTOR};
+use crate::base_law_fit::{COARSENING_FACTOR, leaves_noise};
 use crate::tone_detection::{detect_tones, with_noise_without_tones};
 use stylet_identify::delay_refinement::refine_delay;
 use stylet_identify::fit::{Effort, Fit, fit, fit_from_zero_scatter};
@@ -69,8 +69,7 @@ impl Search {
 
     /// Whether a fit leaves only noise.
     pub(crate) fn leaves_noise(&self, f: &Fit) -> bool {
-        let calm = self.data.with_estimated_noise(&f.residuals.residual_n, NoiseSource::Detrended);
-        f.rms_n(&self.data) < MISFIT_FACTOR * calm.noise.sd_n()
+        leaves_noise(f, &self.data)
     }
 
     /// Detects tones in the residual and estimates the noise without them.

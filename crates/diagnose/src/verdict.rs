@@ -8,6 +8,7 @@ use crate::diagnosis_json::{
 };
 use crate::geometry_selection::free_geometry;
 use crate::held_out::JackknifeResult;
+use crate::model_comparison::confidence;
 use crate::negligible_effects::Negligible;
 use crate::outlier_segment_test::outlier_segment_p_value;
 use crate::parameter_labels::label_parameters;
@@ -171,7 +172,7 @@ pub(crate) fn assess_search(search: &mut Search, competing: &[Vec<CompetingEffec
                 .filter(|r| r.nats_behind < EQUIVALENCE_NATS)
                 .map(|r| r.name.to_owned())
                 .collect(),
-            confidence: 1.0 / (1.0 + weights + libm::exp(-(gain_nats - needed).clamp(-30.0, 30.0) - 3.0)),
+            confidence: confidence(gain_nats - needed, weights),
             parameters,
             gain_nats,
             share: (returned / before.max(1e-9)).clamp(0.0, 1.0),

@@ -2,7 +2,7 @@
 
 use crate::base_law_fit::{PreparedRecordings, SAME_EVENT_S};
 use crate::diagnosis_json::{Cause, Estimate};
-use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
+use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, confidence, likelihood_gain};
 use crate::selection_state::Search;
 use std::sync::Arc;
 use stylet_identify::block_averages::BlockAverages;
@@ -310,7 +310,7 @@ fn cause(search: &Search, effect: &AnyEffect, half_widths: &[f64], removed: impl
     Cause {
         effect: effect.id().to_owned(),
         equivalent: Vec::new(),
-        confidence: 1.0 / (1.0 + libm::exp(-(gain_nats - needed).clamp(-30.0, 30.0) - 3.0)),
+        confidence: confidence(gain_nats - needed, 0.0),
         parameters: parameters
             .map(|((p, value), half)| (p.path.to_owned(), estimate(value, *half)))
             .collect(),

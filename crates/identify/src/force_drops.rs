@@ -5,7 +5,7 @@
 //! significant negative step is the rupture of a layer or of an unmodelled structure.
 
 use crate::block_averages::BlockAverages;
-use stylet_stats::linear_algebra::SymmetricMatrix;
+use stylet_stats::least_squares::NormalEquations;
 use stylet_stats::order_statistics::median;
 
 /// A force drop.
@@ -88,8 +88,7 @@ fn fit_step(b: &BlockAverages, motion: &[(f64, f64)], k: usize, half: usize) -> 
     let (from, to) = (k - half, k + half + 1);
     let v0 = motion[k].1;
     let scale = (from..to).map(|i| (motion[i].1 - v0).abs()).fold(1e-7, f64::max);
-    let mut h = SymmetricMatrix::zeros(REGRESSORS);
-    let mut g = [0.0; REGRESSORS];
+    let mut sums = NormalEquations::<REGRESSORS>::new(REGRESSORS);
     let mut yy = 0.0;
     let mut count = 0.0;
     let mut sides = [0; 2];
@@ -103,22 +102,18 @@ fn fit_step(b: &BlockAverages, motion: &[(f64, f64)], k: usize, half: usize) -> 
         let y = b.force_n[i];
         yy += y * y;
         count += 1.0;
-        for p in 0..REGRESSORS {
-            g[p] += row[p] * y;
-            for q in 0..=p {
-                h.add(p, q, row[p] * row[q]);
-            }
-        }
+        sums.add(&row, y);
     }
     if sides[0] < 4 || sides[1] < 4 {
         return (0.0, f64::INFINITY, f64::INFINITY);
     }
     // Ridge for velocity terms that hardly change within the window.
+    let mut h = sums.matrix();
     h.add(3, 3, 1e-3 * count);
     h.add(4, 4, 1e-3 * count);
     let factor = h.cholesky();
-    let x = factor.solve(&g);
-    let left = yy - x.iter().zip(&g).map(|(x, g)| x * g).sum::<f64>();
+    let x = factor.solve(sums.moments());
+    let left = yy - x.iter().zip(sums.moments()).map(|(x, g)| x * g).sum::<f64>();
     let noise = (left.max(0.0) / (count - REGRESSORS as f64).max(1.0)).sqrt();
     (x[5], factor.inverse_diagonal()[5].sqrt(), noise)
 }

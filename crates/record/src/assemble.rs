@@ -12,7 +12,7 @@ use crate::table_source::{RawTable, ReadOptions, Select, read_bytes, with_table}
 use crate::text::layout::ColumnKind;
 use crate::text::rows::RowsRead;
 use crate::text::source::SourceFile;
-use crate::time_order::{self, retain_rows};
+use crate::time_order::{self, MIN_SAMPLE_NUMBERS, retain_rows};
 
 /// Fewest rows that must remain without those that lack a value.
 const MIN_ROWS: usize = 3;
@@ -20,8 +20,6 @@ const MIN_ROWS: usize = 3;
 const ALTERNATING_SHARE: f64 = 0.1;
 /// Lines that a note lists.
 const MAX_LINES: usize = 100;
-/// Consecutive integers from which a time column counts as a sample number.
-const MIN_SAMPLE_NUMBERS: usize = 100;
 
 /// A quantity with its rows, in SI units.
 #[derive(Debug, Clone)]

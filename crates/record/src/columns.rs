@@ -337,7 +337,8 @@ fn place(head: TableHead<'_>, name: &str) -> Result<Option<usize>, RecordError> 
     }
 }
 
-fn missing(head: TableHead<'_>, column: &str, what: &'static str) -> RecordError {
+/// The error for a column that is not there.
+pub(crate) fn missing(head: TableHead<'_>, column: &str, what: &'static str) -> RecordError {
     if !head.named {
         return RecordError::NoHeader {
             path: head.path.to_owned(),

@@ -2,6 +2,7 @@
 
 use crate::quality::{QualityKind, QualityNote};
 use crate::recording::Recording;
+use crate::time_order::GAP_INTERVALS;
 
 /// Most samples of a diagnosis: eight minutes at 200 Hz.
 pub const MAX_SAMPLES: usize = 100_000;
@@ -9,8 +10,6 @@ pub const MAX_SAMPLES: usize = 100_000;
 const BLOCK_S: f64 = 0.02;
 /// Most blocks of a diagnosis, for a computing time of minutes.
 const MAX_BLOCKS: f64 = 20_000.0;
-/// Least length of a gap in median intervals; samples on both sides are not averaged.
-const GAP_INTERVALS: f64 = 5.0;
 
 /// The recording with consecutive samples averaged (time, position, velocity and force), and a note on it; `None` when it is
 /// short enough. Averaging reduces noise; changes within the new interval are lost.
@@ -31,6 +30,7 @@ pub fn downsample(recording: &Recording) -> Option<(Recording, QualityNote)> {
     let mut out = Recording { velocity_measured: recording.velocity_measured, ..Recording::default() };
     let mut start = 0;
     while start < n {
+        // Samples on both sides of a gap are not averaged.
         let mut end = start + 1;
         while end < n
             && end - start < together

@@ -51,6 +51,7 @@ pub mod long_recording;
 pub mod memory_limit;
 mod quality;
 pub mod recording;
+mod row_groups;
 mod sample_stream;
 mod table_source;
 #[cfg(test)]
@@ -72,6 +73,7 @@ pub use quality::{
     sensor_artefacts,
 };
 pub use recording::{JOINTS, Recording, Sample};
+pub use row_groups::read_csv_groups;
 pub use table_source::ReadOptions;
 
 /// Compiles the examples of the README.

@@ -125,7 +125,7 @@ pub(crate) fn decoded<'a>(
     }
 }
 
-fn with_text<T>(
+pub(crate) fn with_text<T>(
     text: &[u8],
     path: &Path,
     map: Option<&ColumnMap>,

@@ -4,6 +4,10 @@ use crate::error::RecordError;
 use crate::quality::{QualityKind, QualityNote, repaired_rows};
 use crate::text::source::SourceFile;
 
+/// Least length of a gap in median intervals.
+pub(crate) const GAP_INTERVALS: f64 = 5.0;
+/// Consecutive integers from which a time column counts as a sample number.
+pub(crate) const MIN_SAMPLE_NUMBERS: usize = 100;
 /// Share of the rows that a repair may drop.
 pub(crate) const MAX_DROPPED_SHARE: f64 = 0.01;
 /// Share of rows with a repeated time stamp above which the samples arrive in bursts and their stamps are spread.

@@ -30,6 +30,10 @@ pub fn unused_settings(enhance: &EnhanceConfig) -> Vec<&'static str> {
     (guard.revisit_margin_m, guard.blind_travel_m) =
         (default.guard.revisit_margin_m, default.guard.blind_travel_m);
     note("guard", guard != default.guard);
+    let (search, usual) = (&enhance.contact_search, &default.contact_search);
+    note("contact_search.samples", search.samples != usual.samples);
+    note("contact_search.learn_s", search.learn_s != usual.learn_s);
+    note("contact_search.extrapolate_over_m", search.extrapolate_over_m != usual.extrapolate_over_m);
     changed
 }
 
@@ -54,5 +58,11 @@ mod tests {
         // Both use the standstill speed; a Kelvin-Voigt model runs the paper's algorithm.
         assert!(unused("Enhance(drop: (standstill_mps: 2e-5), guard: (blind_travel_m: 0.001))").is_empty());
         assert!(unused("Enhance(model: KelvinVoigt, forgetting: 0.99)").is_empty());
+        let search = "contact_search: (samples: 9, learn_s: 0.5, extrapolate_over_m: 0.002, noise_sds: 4.0)";
+        assert_eq!(
+            unused(&format!("Enhance({search})")),
+            ["contact_search.samples", "contact_search.learn_s", "contact_search.extrapolate_over_m"]
+        );
+        assert!(unused(&format!("Enhance(algorithm: Paper, {search})")).is_empty());
     }
 }

@@ -64,6 +64,8 @@ pub struct Trace {
     pub first_estimate: usize,
     /// Index of the first rupture since the last restart.
     pub first_detection: usize,
+    /// Index of the first value of the columns since the last restart.
+    pub first_sample: usize,
 }
 
 impl Trace {
@@ -139,6 +141,9 @@ impl Trace {
     pub fn push(&mut self, out: &stylet_core::Output) {
         let [low, high] = out.band_n.unwrap_or([f64::NAN; 2]);
         let [stiffness, friction] = coefficients(out);
+        if out.restarted {
+            self.first_sample = self.enhanced_n.len();
+        }
         self.enhanced_n.push(out.enhanced_n);
         self.low_n.push(low);
         self.high_n.push(high);
@@ -151,6 +156,18 @@ impl Trace {
         self.derivative_n_per_s.push(out.derivative_n_per_s);
         self.state.push(out.state);
         self.unused_reason.push(out.unused_reason);
+    }
+
+    /// The ruptures since the last restart, from which layers are counted.
+    #[must_use]
+    pub fn detections_since_restart(&self) -> &[Detection] {
+        self.detections.get(self.first_detection..).unwrap_or_default()
+    }
+
+    /// The estimates since the last restart.
+    #[must_use]
+    pub fn estimates_since_restart(&self) -> &[LayerEstimate] {
+        self.estimates.get(self.first_estimate..).unwrap_or_default()
     }
 
     /// Records the ruptures, estimates and contact of a sample.
@@ -172,7 +189,7 @@ impl Trace {
         self.detections.extend(out.detection);
         if let Some(estimate) = out.estimate {
             // A later estimate of a layer replaces the earlier one, which is among the last.
-            let since_restart = self.estimates.get(self.first_estimate..).unwrap_or_default();
+            let since_restart = self.estimates_since_restart();
             if let Some(earlier) = since_restart.iter().rposition(|e| e.layer == estimate.layer) {
                 self.estimates.remove(self.first_estimate + earlier);
             }

@@ -11,6 +11,7 @@
 //! | [`robust_loss`] | Huber and Student losses, weights, M-estimate of location |
 //! | [`autoregressive`] | autoregressive noise: fit, order selection, exact whitening, likelihood |
 //! | [`robust_linear_prediction`] | linear prediction by robust least squares |
+//! | [`least_squares`] | linear least squares by normal equations |
 //! | [`linear_algebra`] | small dense matrices: Cholesky factor, scalar product |
 //! | [`spectrum`] | power spectrum of evenly sampled signals, detection of tones |
 //! | [`number_format`] | numbers as text: significant digits, per cent, p-values |
@@ -24,6 +25,7 @@
 pub mod autoregressive;
 pub mod confidence_interval;
 pub mod interpolation;
+pub mod least_squares;
 pub mod linear_algebra;
 pub mod moments;
 pub mod normal;

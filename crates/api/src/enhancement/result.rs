@@ -12,7 +12,7 @@ use crate::run_report::{AlgorithmRun, run_report};
 use crate::simulate::settings_note;
 use std::path::Path;
 use stylet_core::config::Model;
-use stylet_record::{QualityNote, Recording};
+use stylet_record::{QualityKind, QualityNote, Recording};
 use stylet_report::insertion_report::{ForceTrace, Provenance, RunReport};
 use stylet_report::svg::FigureOptions;
 use stylet_scenario::{EnhancerConfigFile, ron_options};
@@ -155,6 +155,10 @@ impl EnhancementResult {
     /// [`Error::Internal`] when the configuration cannot be written.
     pub fn report(&self, source: &ResultSource) -> Result<RunReport, Error> {
         let Self { recording, extent, notes, algorithm_runs: runs, hash, config, .. } = self;
+        // Units that were applied as the file says are no reason to doubt the recording.
+        let (converted, doubtful): (Vec<_>, Vec<_>) =
+            notes.iter().partition(|note| note.kind == QualityKind::Converted);
+        let conversions = converted.iter().map(|note| note.message.as_str()).collect::<Vec<_>>().join("; ");
         let selection = (extent.samples > recording.len())
             .then(|| plot_samples::selection_note(extent.samples, recording.len(), runs.len()));
         let body = ron_options().to_string_pretty(config, Default::default()).map_err(Error::internal)?;
@@ -170,14 +174,18 @@ impl EnhancementResult {
                 version: env!("CARGO_PKG_VERSION").to_owned(),
                 hash: hash.clone(),
             },
-            notes: notes
+            notes: doubtful
                 .iter()
                 .map(|n| n.message.clone())
                 .chain(settings_note(runs))
                 .chain(unused_note(runs))
-                .chain(self.model.iter().map(AppliedModel::summary))
                 .chain(self.model.iter().flat_map(|model| model.notes.clone()))
                 .chain(selection)
+                .collect(),
+            remarks: Some(conversions)
+                .filter(|text| !text.is_empty())
+                .into_iter()
+                .chain(self.model.iter().map(AppliedModel::summary))
                 .collect(),
             ..run_report(
                 recording,
@@ -214,5 +222,48 @@ impl EnhancementResult {
             EnhancedTable::Staged(file) => output.add_staged(file),
         }
         Ok(output)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ResultSource, enhance_recording};
+    use std::collections::BTreeMap;
+    use std::path::Path;
+    use stylet_record::{QualityKind, QualityNote, Recording};
+    use stylet_scenario::EnhancerConfigFile;
+
+    #[test]
+    fn the_page_warns_of_gaps_and_not_of_conversions() -> Result<(), Box<dyn std::error::Error>> {
+        let time_s: Vec<f64> = (0..200).map(|k| 0.005 * f64::from(k)).collect();
+        let recording = Recording {
+            position_m: time_s.iter().map(|t| 0.002 * t).collect(),
+            velocity_mps: vec![0.002; 200],
+            force_n: vec![0.0; 200],
+            time_s,
+            ..Recording::default()
+        };
+        let note = |kind, message: &str| QualityNote {
+            kind,
+            message: message.to_owned(),
+            numbers: BTreeMap::new(),
+            lines: Vec::new(),
+            blocking: false,
+        };
+        let notes = vec![
+            note(QualityKind::Converted, "force converted from kN"),
+            note(QualityKind::Gaps, "2 gap(s)"),
+            note(QualityKind::Converted, "position converted from mm"),
+        ];
+        let config = EnhancerConfigFile::default();
+        let model = config.enhance.model;
+        let result = enhance_recording(recording, notes, config, &[model], None)?;
+        let source = ResultSource { data: Path::new("gel.csv"), config: None, command: String::new() };
+        let page = result.report(&source)?;
+        assert_eq!(page.notes, ["2 gap(s)"]);
+        assert_eq!(page.remarks, ["force converted from kN; position converted from mm"]);
+        let html = page.to_html();
+        assert!(html.contains("force converted from kN; position converted from mm"));
+        Ok(())
     }
 }

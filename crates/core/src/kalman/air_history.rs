@@ -16,6 +16,7 @@
 pub(super) use super::air_sums::Form;
 use super::air_sums::{Block, MIN_REMAINING_SHARE, Suffix, Totals};
 use super::gaussian::at_least;
+use super::noise_estimator::MAX_RHO;
 use crate::sample::{BaselineKind, Sample};
 
 /// Blocks per level, and in the last level (an odd number).
@@ -35,8 +36,6 @@ const SPIKE_SDS: f64 = 6.0;
 const MIN_DIFFERENCES: f64 = 5.0;
 /// Clip of squared differences, in multiples of their mean, so that a step does not count as noise.
 const MAX_SQUARED_DIFFERENCE: f64 = 16.0;
-/// Largest noise correlation from sample to sample.
-const MAX_RHO: f64 = 0.98;
 /// Lag in samples of the differences from which a correlation above [`LONG_LAG_FROM`] is solved, to `2^-BISECTIONS`.
 const LONG_LAG: usize = 8;
 const LONG_LAG_FROM: f64 = 0.5;

@@ -27,8 +27,8 @@ pub(crate) const B: usize = 2;
 pub(crate) const K_PREV: usize = 3;
 pub(crate) const B_PREV: usize = 4;
 pub(super) const BIAS: usize = 5;
-const DRIFT: usize = 6;
-const LINE: usize = 7;
+pub(super) const DRIFT: usize = 6;
+pub(super) const LINE: usize = 7;
 const N: usize = 8;
 /// Unknowns in use where the baseline is constant.
 const WITHOUT_BASELINE: usize = 6;

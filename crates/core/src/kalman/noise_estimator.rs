@@ -6,7 +6,7 @@ use super::gaussian::{at_least, at_most};
 /// Longest memory in tissue, in samples: `sigma` to within 3 %, and so the false-alarm rate to within a factor of two.
 const MEMORY_SAMPLES: f64 = 2000.0;
 /// Largest lag-one correlation.
-const MAX_RHO: f64 = 0.98;
+pub(super) const MAX_RHO: f64 = 0.98;
 /// Clip of squared standardised innovations, so that single events do not bias the noise level.
 const MAX_SQUARED_INNOVATION: f64 = 16.0;
 /// Samples in air before the first estimate.

@@ -78,14 +78,11 @@ impl KalmanEnhancer {
                 (friction, variance) = (dry_n, sd * sd);
             }
         }
-        let mut baseline_n = 0.0;
-        if let Some((residual_n, residual_variance)) =
-            self.estimator.baseline_residual_n(sample.position_m, &self.noise)
-            && self.in_tissue
-        {
-            baseline_n = residual_n;
-            variance += residual_variance;
+        let (mut baseline_n, mut baseline_variance) = (0.0, 0.0);
+        if self.in_tissue {
+            (baseline_n, baseline_variance) = self.baseline_residual_n(sample);
         }
+        variance += baseline_variance;
         let out = &mut self.output;
         out.state = if out.detection.is_some() {
             State::DetectedRupture
@@ -100,13 +97,25 @@ impl KalmanEnhancer {
         out.band_n = Some([out.enhanced_n - half, out.enhanced_n + half]);
     }
 
+    /// What remains of a moving baseline in the force of a sample, in N, and its variance in N².
+    #[inline(always)]
+    fn baseline_residual_n(&self, sample: &Sample) -> (f64, f64) {
+        self.estimator.baseline_residual_n(sample.position_m, &self.noise).unwrap_or((0.0, 0.0))
+    }
+
+    /// Force of a sample without the sensor's baseline, in N.
+    #[inline(always)]
+    pub(super) fn force_without_baseline_n(&self, sample: &Sample) -> f64 {
+        sample.force_n - self.noise.bias_n() - self.baseline_residual_n(sample).0
+    }
+
     #[inline(always)]
     fn shaft_sample(&self, config: &EnhanceConfig, sample: &Sample) -> ShaftSample {
         let standstill = config.drop.standstill_mps;
         ShaftSample {
             gain: self.low_pass_gains[2],
             position_m: sample.position_m,
-            force_n: sample.force_n - self.noise.bias_n(),
+            force_n: self.force_without_baseline_n(sample),
             advancing: sample.velocity_mps > standstill,
             retracting: sample.velocity_mps < -standstill,
             peak_force_n: self.peak_force_n,
@@ -128,8 +137,9 @@ impl KalmanEnhancer {
         }
         let shaft_sample = self.shaft_sample(config, &self.last_sample);
         let (friction_n, sd) = self.dry_friction.update_with_model(&shaft_sample, model_n);
-        let enhanced_n = self.last_sample.force_n - friction_n;
-        let half = Z95 * libm::sqrt(shaft_sample.noise_variance_n2 + sd * sd);
+        let (baseline_n, baseline_variance) = self.baseline_residual_n(&self.last_sample);
+        let enhanced_n = self.last_sample.force_n - friction_n - baseline_n;
+        let half = Z95 * libm::sqrt(shaft_sample.noise_variance_n2 + sd * sd + baseline_variance);
         Some((enhanced_n, [enhanced_n - half, enhanced_n + half]))
     }
 

@@ -119,7 +119,7 @@ impl KalmanEnhancer {
         }
         self.snapshot = self.estimator;
         self.snapshot_m = sample.position_m;
-        self.dry_friction.rupture(sample.position_m, sample.force_n - self.noise.bias_n());
+        self.dry_friction.rupture(sample.position_m, self.force_without_baseline_n(sample));
     }
 
     #[cold]
@@ -161,7 +161,7 @@ impl KalmanEnhancer {
             self.output.contact_m = Some(self.estimator.start_m - self.estimator.previous_thickness_m);
         }
         self.output.ruptures += 1;
-        self.dry_friction.rupture(sample.position_m, sample.force_n - bias);
+        self.dry_friction.rupture(sample.position_m, self.force_without_baseline_n(sample));
         // At the threshold a rupture is twice as likely as a false alarm; the excess adds to its log odds.
         let confidence = 1.0 / (1.0 + libm::exp(-(excess_nats + core::f64::consts::LN_2)));
         let (drop_n, drop_sd_n) = self.last_drop_n;

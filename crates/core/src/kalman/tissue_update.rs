@@ -29,7 +29,7 @@ impl KalmanEnhancer {
     #[inline(always)]
     pub(super) fn update_in_tissue(&mut self, config: &EnhanceConfig, step: &MotionStep, sample: &Sample) {
         let force_n = sample.force_n;
-        self.restart_if_invalid(step, sample);
+        self.restart_if_invalid(config, step, sample);
         self.estimator.elapsed_s += step.dt_s;
         self.operations += OPERATIONS_PER_PREDICTION;
         self.predictor.advance(step, &self.noise);
@@ -252,9 +252,9 @@ impl KalmanEnhancer {
 
     /// Restarts filters whose state is no longer finite.
     #[inline(always)]
-    pub(super) fn restart_if_invalid(&mut self, step: &MotionStep, sample: &Sample) {
+    pub(super) fn restart_if_invalid(&mut self, config: &EnhanceConfig, step: &MotionStep, sample: &Sample) {
         if !(self.noise.variance.is_finite() && self.noise.variance < 1e12) {
-            self.noise = NoiseEstimator::new(1e-3);
+            self.noise = NoiseEstimator::new(config.contact_search.min_noise_n);
         }
         if !self.predictor.belief.is_finite() {
             self.predictor = ForcePredictor::new(sample.force_n);

@@ -1,7 +1,7 @@
 //! Measurement of the force drop at a rupture.
 
 use super::line_fit::LineFit;
-use super::sample_ring::SampleRing;
+use super::sample_ring::{SampleRing, Storage};
 use crate::config::{DropConfig, DropEstimator};
 use crate::sample::Sample;
 
@@ -15,7 +15,7 @@ const AVERAGED_SAMPLES: u64 = 3;
 /// Locates a declared rupture at the steepest fall of the force among the samples from index `first` on; returns the index of
 /// the first sample after the drop. At most [`MAX_LOOK_BACK`] places are inspected, evenly spread when there are more
 /// samples.
-pub(crate) fn locate_drop<B: AsRef<[Sample]> + AsMut<[Sample]>>(ring: &SampleRing<B>, first: u64) -> u64 {
+pub(crate) fn locate_drop(ring: &SampleRing<impl Storage>, first: u64) -> u64 {
     let newest = ring.next_index().saturating_sub(1);
     let earliest = first.max(ring.oldest_index());
     let stride = (newest.saturating_sub(earliest) / MAX_LOOK_BACK).max(1);
@@ -58,11 +58,7 @@ pub(crate) struct ForceDrop {
 impl ForceDrop {
     /// Begins at sample index `after`, the first after the drop; looks back over at most [`MAX_LOOK_BACK`] samples, none
     /// before `first`.
-    pub(crate) fn begin<B: AsRef<[Sample]> + AsMut<[Sample]>>(
-        ring: &SampleRing<B>,
-        first: u64,
-        after: u64,
-    ) -> Self {
+    pub(crate) fn begin(ring: &SampleRing<impl Storage>, first: u64, after: u64) -> Self {
         let mut drop =
             Self { max_before_n: f64::NEG_INFINITY, min_after_n: f64::INFINITY, ..Self::default() };
         let before = |back: u64| after.checked_sub(back).and_then(|n| ring.get(n));

@@ -3,7 +3,7 @@
 
 use super::friction_compensation::FrictionCompensation;
 use super::rls::Rls;
-use super::sample_ring::SampleRing;
+use super::sample_ring::{SampleRing, Storage};
 use crate::config::{EnhanceConfig, Model, Reset};
 use crate::sample::Sample;
 
@@ -104,10 +104,10 @@ impl LayerReplay {
 
     /// Replays at most `config.drop.replay_per_tick` samples. Returns the parameters when finished, or `online` when no
     /// samples are left or the result is not finite.
-    pub(crate) fn process_batch<B: AsRef<[Sample]> + AsMut<[Sample]>>(
+    pub(crate) fn process_batch(
         &mut self,
         config: &EnhanceConfig,
-        ring: &SampleRing<B>,
+        ring: &SampleRing<impl Storage>,
         compensation: &FrictionCompensation,
         online: [f64; 2],
     ) -> Option<[f64; 2]> {

@@ -10,7 +10,7 @@ mod low_pass;
 mod motion_guard;
 mod preprocessing;
 pub(crate) mod rls;
-mod sample_ring;
+pub(crate) mod sample_ring;
 pub(crate) mod state_machine;
 
 use crate::config::{Algorithm, Contact, CusumConfig, Depths, DropEstimator, EnhanceConfig, Model};
@@ -21,7 +21,7 @@ use friction_compensation::FrictionCompensation;
 use layer_replay::{LayerReplay, ResetClock, regressor, relative_noise, reweighted_prior};
 use preprocessing::{Preprocessor, SampleFlags};
 use rls::Rls;
-use sample_ring::SampleRing;
+use sample_ring::{SampleRing, Storage};
 
 /// Samples that are preprocessed ahead of the estimator.
 const BLOCK_SAMPLES: usize = 64;
@@ -69,10 +69,10 @@ struct PendingLayer {
     elastic_share: f64,
 }
 
+/// The raw samples of a layer are kept in a ring beside it, which every call is given.
 #[derive(Clone, Debug)]
-pub(crate) struct PaperEnhancer<B> {
+pub(crate) struct PaperEnhancer {
     config: EnhanceConfig,
-    ring: SampleRing<B>,
     preprocessor: Preprocessor,
     contact: ContactDetector,
     compensation: FrictionCompensation,
@@ -92,8 +92,8 @@ pub(crate) struct PaperEnhancer<B> {
     out: Output,
 }
 
-impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
-    pub(crate) fn new(mut config: EnhanceConfig, surface_m: f64, storage: B) -> Self {
+impl PaperEnhancer {
+    pub(crate) fn new(mut config: EnhanceConfig, surface_m: f64) -> Self {
         if config.algorithm == Algorithm::Literal {
             config.guard.blind_travel_m = 0.0;
             config.guard.rest_s = 0.0;
@@ -104,7 +104,6 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
         }
         let prior = [config.prior_stiffness, config.prior_friction];
         Self {
-            ring: SampleRing::new(storage),
             preprocessor: Preprocessor::new(&config),
             contact: ContactDetector::new(&config.contact_search),
             compensation: FrictionCompensation::default(),
@@ -133,47 +132,10 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
         [self.config.prior_stiffness, self.config.prior_friction]
     }
 
-    /// Re-initialises everything but the configuration and the storage.
+    /// Re-initialises everything but the configuration.
     #[cold]
     pub(crate) fn restart(&mut self, surface_m: f64) {
-        let PaperEnhancer {
-            config,
-            ring: _,
-            preprocessor,
-            contact,
-            compensation,
-            rls,
-            clock,
-            in_contact,
-            traversal,
-            pending,
-            cusum,
-            cusum_n2,
-            disabled_until,
-            zero_until,
-            waited_m,
-            waited_s,
-            settled_for_s,
-            out,
-        } = PaperEnhancer::<[Sample; 0]>::new(core::mem::take(&mut self.config), surface_m, []);
-        self.config = config;
-        self.ring.clear();
-        self.preprocessor = preprocessor;
-        self.contact = contact;
-        self.compensation = compensation;
-        self.rls = rls;
-        self.clock = clock;
-        self.in_contact = in_contact;
-        self.traversal = traversal;
-        self.pending = pending;
-        self.cusum = cusum;
-        self.cusum_n2 = cusum_n2;
-        self.disabled_until = disabled_until;
-        self.zero_until = zero_until;
-        self.waited_m = waited_m;
-        self.waited_s = waited_s;
-        self.settled_for_s = settled_for_s;
-        self.out = out;
+        *self = Self::new(core::mem::take(&mut self.config), surface_m);
     }
 
     pub(crate) fn output(&self) -> &Output {
@@ -209,24 +171,29 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
 
     /// As `step`, but updates only the fields that [`Enhancer::step_brief`](crate::Enhancer::step_brief) lists.
     #[inline]
-    pub(crate) fn step_brief(&mut self, sample: Sample) -> &Output {
+    pub(crate) fn step_brief(&mut self, ring: &mut SampleRing<impl Storage>, sample: Sample) -> &Output {
         let mut flags = SampleFlags::default();
         self.preprocessor.process(&self.config, sample, &mut flags);
-        self.take(sample, flags);
+        self.take(ring, sample, flags);
         &self.out
     }
 
     /// As `step_brief` for many samples, with the same results. Preprocessing runs ahead of the estimator, a block at a time,
     /// which is faster.
     #[inline]
-    pub(crate) fn run(&mut self, samples: &[Sample], mut each: impl FnMut(&Output)) -> &Output {
+    pub(crate) fn run(
+        &mut self,
+        ring: &mut SampleRing<impl Storage>,
+        samples: &[Sample],
+        mut each: impl FnMut(&Output),
+    ) -> &Output {
         let mut flags = [SampleFlags::default(); BLOCK_SAMPLES];
         for block in samples.chunks(BLOCK_SAMPLES) {
             for (flags, sample) in flags.iter_mut().zip(block) {
                 self.preprocessor.process(&self.config, *sample, flags);
             }
             for (flags, sample) in flags.iter().zip(block) {
-                self.take(*sample, *flags);
+                self.take(ring, *sample, *flags);
                 each(&self.out);
             }
         }
@@ -234,7 +201,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
     }
 
     #[inline(always)]
-    fn take(&mut self, sample: Sample, flags: SampleFlags) {
+    fn take(&mut self, ring: &mut SampleRing<impl Storage>, sample: Sample, flags: SampleFlags) {
         self.out.detection = None;
         self.out.estimate = None;
         self.out.restarted = false;
@@ -246,14 +213,14 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
             return;
         }
         self.out.unused_reason = None;
-        let index = self.ring.next_index();
-        self.ring.push(sample);
+        let index = ring.next_index();
+        ring.push(sample);
         self.update_contact(flags.dt_s, sample, index);
         let before = self.rls.theta;
         let v = sample.velocity_mps;
         let compensated_n = sample.force_n - self.compensation.friction_at_ns_per_m(sample.position_m) * v;
-        self.out.error_n = self.identify(flags.dt_s, sample, compensated_n);
-        self.advance_state(sample, flags, before);
+        self.out.error_n = self.identify(index, flags.dt_s, sample, compensated_n);
+        self.advance_state(ring, sample, flags, before);
         self.out.enhanced_n = compensated_n;
         if self.out.estimate.is_some() {
             let friction = self.compensation.friction_at_ns_per_m(sample.position_m);
@@ -309,7 +276,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
 
     /// RLS update; returns the innovation.
     #[inline(always)]
-    fn identify(&mut self, dt_s: f64, sample: Sample, compensated_n: f64) -> f64 {
+    fn identify(&mut self, index: u64, dt_s: f64, sample: Sample, compensated_n: f64) -> f64 {
         let depth_m = sample.position_m - self.traversal.start_m;
         if !self.in_contact || depth_m <= 0.0 {
             return 0.0;
@@ -330,17 +297,23 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
             error_n = self.rls.update_with_noise(phi, compensated_n, self.config.forgetting, noise);
         }
         if self.traversal.crossed.is_none() && self.known_thickness_m().is_some_and(|d| depth_m >= d) {
-            self.traversal.crossed = Some(self.ring.next_index().saturating_sub(1));
+            self.traversal.crossed = Some(index);
         }
         error_n
     }
 
     #[inline(always)]
-    fn advance_state(&mut self, sample: Sample, flags: SampleFlags, before: [f64; 2]) {
+    fn advance_state(
+        &mut self,
+        ring: &SampleRing<impl Storage>,
+        sample: Sample,
+        flags: SampleFlags,
+        before: [f64; 2],
+    ) {
         let dt_s = flags.dt_s;
         match self.out.state {
             State::NoRupture | State::ExpectedRupture | State::FreeTip => {
-                self.detect_rupture(sample, flags, before);
+                self.detect_rupture(ring, sample, flags, before);
             }
             State::DetectedRupture => {
                 self.out.state = State::ForceDropMeasuring;
@@ -349,12 +322,18 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
                 self.measure_drop(dt_s, sample);
             }
             State::ForceDropMeasuring => self.measure_drop(dt_s, sample),
-            State::ForceCompensation => self.compensate(dt_s, sample),
+            State::ForceCompensation => self.compensate(ring, dt_s, sample),
         }
     }
 
     #[inline(always)]
-    fn detect_rupture(&mut self, sample: Sample, flags: SampleFlags, before: [f64; 2]) {
+    fn detect_rupture(
+        &mut self,
+        ring: &SampleRing<impl Storage>,
+        sample: Sample,
+        flags: SampleFlags,
+        before: [f64; 2],
+    ) {
         if !self.in_contact {
             return;
         }
@@ -371,11 +350,11 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
                 cause = Some(Cause::Cusum);
             }
             if was == 0.0 {
-                self.zero_until = self.ring.next_index().saturating_sub(1);
+                self.zero_until = ring.next_index().saturating_sub(1);
             }
         } else {
             self.cusum_n2 = 0.0;
-            self.zero_until = self.ring.next_index();
+            self.zero_until = ring.next_index();
             self.disabled_until = self.zero_until;
         }
         let expected = self.out.state == State::ExpectedRupture;
@@ -386,7 +365,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
             cause = Some(Cause::KnownFace);
         }
         if let Some(cause) = cause {
-            self.declare_rupture(sample, flags.dt_s, before, cause);
+            self.declare_rupture(ring, sample, flags.dt_s, before, cause);
         } else {
             self.out.state = if flags.derivative_on() { State::ExpectedRupture } else { State::NoRupture };
         }
@@ -402,21 +381,28 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
 
     /// Sets the traversed layer aside and begins a new one.
     #[cold]
-    fn declare_rupture(&mut self, sample: Sample, dt_s: f64, before: [f64; 2], cause: Cause) {
-        let newest = self.ring.next_index().saturating_sub(1);
+    fn declare_rupture(
+        &mut self,
+        ring: &SampleRing<impl Storage>,
+        sample: Sample,
+        dt_s: f64,
+        before: [f64; 2],
+        cause: Cause,
+    ) {
+        let newest = ring.next_index().saturating_sub(1);
         let literal = self.config.algorithm == Algorithm::Literal;
         let after = match cause {
             _ if literal => newest,
             Cause::KnownFace => self.traversal.crossed.unwrap_or(newest),
             // The alarm accumulated since the sum was last zero.
-            Cause::Cusum => self.locate_from(self.zero_until.saturating_sub(4)),
+            Cause::Cusum => self.locate_from(ring, self.zero_until.saturating_sub(4)),
             // The filters of the derivative delay by at most about a second.
             Cause::DerivativeTrailingEdge => {
                 let second = 1.0 / dt_s.max(1e-9);
-                self.locate_from(self.disabled_until.max(newest.saturating_sub(second as u64)))
+                self.locate_from(ring, self.disabled_until.max(newest.saturating_sub(second as u64)))
             }
         };
-        let located = self.ring.get(after).copied().unwrap_or(sample);
+        let located = ring.get(after).copied().unwrap_or(sample);
         let start_m = self.traversal.start_m;
         let thickness_m = self.known_thickness_m().unwrap_or((located.position_m - start_m).max(0.0));
         self.out.ruptures += 1;
@@ -437,7 +423,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
             end: after,
             thickness_m,
             online: before,
-            drop: ForceDrop::begin(&self.ring, self.traversal.first, after),
+            drop: ForceDrop::begin(ring, self.traversal.first, after),
             replay: None,
             drop_n: 0.0,
             elastic_share: 0.0,
@@ -448,8 +434,8 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
         self.out.state = State::DetectedRupture;
     }
 
-    fn locate_from(&self, index: u64) -> u64 {
-        locate_drop(&self.ring, index.max(self.traversal.first))
+    fn locate_from(&self, ring: &SampleRing<impl Storage>, index: u64) -> u64 {
+        locate_drop(ring, index.max(self.traversal.first))
     }
 
     /// Adds travel and time to a waiting state; standstill does not count.
@@ -503,13 +489,11 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> PaperEnhancer<B> {
 
     /// State ForceCompensation: replays the layer in batches, then adds its friction.
     #[inline]
-    fn compensate(&mut self, dt_s: f64, sample: Sample) {
+    fn compensate(&mut self, ring: &SampleRing<impl Storage>, dt_s: f64, sample: Sample) {
         self.wait(dt_s, sample);
         if let Some(mut pending) = self.pending.take() {
             let theta = match &mut pending.replay {
-                Some(replay) => {
-                    replay.process_batch(&self.config, &self.ring, &self.compensation, pending.online)
-                }
+                Some(replay) => replay.process_batch(&self.config, ring, &self.compensation, pending.online),
                 None => Some(pending.online),
             };
             match theta {

@@ -2,6 +2,11 @@
 
 use crate::sample::Sample;
 
+/// Memory for samples.
+pub(crate) trait Storage: AsRef<[Sample]> + AsMut<[Sample]> {}
+
+impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Storage for B {}
+
 /// Samples with consecutive indices; the oldest are overwritten.
 #[derive(Clone, Debug)]
 pub(crate) struct SampleRing<B> {
@@ -11,7 +16,7 @@ pub(crate) struct SampleRing<B> {
     slot: usize,
 }
 
-impl<B: AsRef<[Sample]> + AsMut<[Sample]>> SampleRing<B> {
+impl<B: Storage> SampleRing<B> {
     pub(crate) fn new(storage: B) -> Self {
         Self { storage, next: 0, slot: 0 }
     }

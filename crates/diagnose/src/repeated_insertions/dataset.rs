@@ -15,11 +15,10 @@
 
 use super::segmented_recording::SegmentedRecording;
 use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use stylet_record::{
     ColumnMap, QualityKind, QualityNote, ReadOptions, RecordError, Recording, check_usable,
-    find_outlier_recordings, read_csv, read_csv_bytes,
+    find_outlier_recordings, read_csv, read_csv_groups,
 };
 use stylet_scenario::{FieldError, InputError, parse, read_text};
 use stylet_tissue::Tissue;
@@ -226,46 +225,8 @@ impl Dataset {
             let (recording, notes) = read_csv(file, &self.options())?;
             return Ok(vec![(name, recording, notes)]);
         }
-        let text = read_text_of(file)?;
-        let mut lines = text.lines();
-        let header = lines.next().unwrap_or_default();
-        let columns: Vec<&str> = header.split(',').map(str::trim).collect();
-        let mut places = Vec::new();
-        for wanted in &self.split_by {
-            let place = columns.iter().position(|c| c == wanted).ok_or_else(|| {
-                DatasetError::TooLittle(format!(
-                    "{}: there is no column {wanted:?} to split by; there are {}",
-                    file.display(),
-                    columns.join(", ")
-                ))
-            })?;
-            places.push(place);
-        }
-        let mut groups: Vec<(String, String)> = Vec::new();
-        let mut known: BTreeMap<String, usize> = BTreeMap::new();
-        for line in lines {
-            let cells: Vec<&str> = line.split(',').collect();
-            let key =
-                places.iter().map(|p| cells.get(*p).map_or("", |c| c.trim())).collect::<Vec<_>>().join(" ");
-            let place = *known.entry(key).or_insert_with_key(|key| {
-                groups.push((key.clone(), format!("{header}\n")));
-                groups.len() - 1
-            });
-            groups[place].1.push_str(line);
-            groups[place].1.push('\n');
-        }
-        let mut out = Vec::with_capacity(groups.len());
-        for (key, text) in groups {
-            let (recording, notes) = read_csv_bytes(text.as_bytes(), file, &self.options())?;
-            out.push((key, recording, notes));
-        }
-        Ok(out)
+        Ok(read_csv_groups(file, &self.options(), &self.split_by)?)
     }
-}
-
-fn read_text_of(file: &Path) -> Result<String, DatasetError> {
-    std::fs::read_to_string(file)
-        .map_err(|source| RecordError::Unreadable { path: file.to_owned(), source }.into())
 }
 
 /// Files that match a pattern, sorted. Relative patterns start at the folder in the environment variable `STYLET_MEASURED`.

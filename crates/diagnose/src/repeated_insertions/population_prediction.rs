@@ -1,7 +1,7 @@
 //! Predicts forces of new recordings: mean and band over draws of a population.
 
 use super::insertion_phase::phase_at;
-use super::random_effects_population::{Population, QUANTILES};
+use super::random_effects_population::{Population, QUANTILES, is_in_air};
 use super::segmented_recording::SegmentedRecording;
 use stylet_identify::model::{DayParameters, Model, NO_RUPTURE, Parameter, RecordingParameters};
 use stylet_record::Recording;
@@ -104,7 +104,7 @@ pub fn predict_force(
         all.clear();
         for (force, first_s) in &forces {
             let part = phase_at(run, r.time_s[i], *first_s) as usize;
-            let pieces = if force[i] == 0.0 {
+            let pieces = if is_in_air(force[i]) {
                 &population.air_quantiles_n
             } else {
                 &population.residual_quantiles_n[part]

@@ -16,11 +16,18 @@ use stylet_tissue::Effect;
 
 /// Number of equally likely values of a residual; the outermost of ten are the ends of a 90 % band.
 pub const QUANTILES: usize = 10;
+/// Predicted force (N) up to which the needle is in air: rounding errors and the tail of a lag, below the resolution of any sensor.
+const MAX_AIR_FORCE_N: f64 = 1e-6;
 /// Bases of the Halton sequence.
 const PRIMES: [usize; 24] =
     [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71, 73, 79, 83, 89];
 /// Samples per window in which the noise about a line is measured.
 const NOISE_WINDOW: usize = 8;
+
+/// Whether a force is predicted in air, where the residual is sensor noise.
+pub(super) fn is_in_air(predicted_n: f64) -> bool {
+    predicted_n.abs() <= MAX_AIR_FORCE_N
+}
 
 /// Fitted model with the distribution of random effects and residuals.
 #[derive(Clone, Debug)]
@@ -50,8 +57,7 @@ impl Population {
         for (r, (b, e)) in fitted.data.recordings.iter().zip(&fitted.fit.residuals.residual_n).enumerate() {
             let first = model.rupture_times_s[r].iter().copied().fold(NO_RUPTURE, f64::min);
             for k in (0..b.len()).filter(|k| b.used[*k]) {
-                // In air the predicted force is zero.
-                if e[k] == b.force_n[k] {
+                if is_in_air(b.force_n[k] - e[k]) {
                     air.push(e[k]);
                 } else {
                     left[phase_at(recordings[r], 0.5 * (b.start_s[k] + b.end_s[k]), first) as usize]

@@ -5,7 +5,7 @@
 //! times more accurate. Intervals whose residuals are not white under any form are smoothed by local windows (`smooth_positions`).
 
 use core::f64::consts::{PI, TAU};
-use stylet_stats::linear_algebra::SymmetricMatrix;
+use stylet_stats::least_squares::NormalEquations;
 
 /// Highest frequency (Hz) that is searched; faster motion is left to local windows.
 const HIGHEST_HZ: f64 = 3.0;
@@ -299,29 +299,16 @@ fn least_squares(
         return None;
     }
     let base = z[0];
-    let (mut m, mut g, mut squares) =
-        ([[0.0; MAX_COEFFICIENTS]; MAX_COEFFICIENTS], [0.0; MAX_COEFFICIENTS], 0.0);
+    let (mut sums, mut squares) = (NormalEquations::<MAX_COEFFICIENTS>::new(count), 0.0);
     let mut row = [0.0; MAX_COEFFICIENTS];
     for (t, z) in t.iter().zip(z) {
         rows(&mut row, *t);
         let z = z - base;
         squares += z * z;
-        for a in 0..count {
-            g[a] += row[a] * z;
-            for b in 0..=a {
-                m[a][b] += row[a] * row[b];
-            }
-        }
+        sums.add(&row, z);
     }
-    let mut h = SymmetricMatrix::zeros(count);
-    for (a, line) in m.iter().enumerate().take(count) {
-        for (b, value) in line.iter().enumerate().take(a + 1) {
-            h.add(a, b, *value);
-        }
-    }
-    let solved = h.cholesky().solve(&g[..count]);
     let mut x = [0.0; MAX_COEFFICIENTS];
-    x[..count].copy_from_slice(&solved);
+    x[..count].copy_from_slice(&sums.solve());
     x[0] += base;
     // Summed over residuals: the difference of sums in the normal equations loses precision.
     let mut left = 0.0;

@@ -4,7 +4,7 @@
 //! `stylet_record::differentiate` would leave residuals at every ripple and stop. Here each window is as narrow as the position noise
 //! allows and ends at velocity jumps, which are located at the intersection of the parabolas on both sides.
 
-use stylet_stats::linear_algebra::SymmetricMatrix;
+use stylet_stats::least_squares::NormalEquations;
 use stylet_stats::order_statistics::median;
 
 /// Target standard deviation of the velocity (m/s), which determines the window: 2.5 mN at 500 Ns/m.
@@ -223,23 +223,12 @@ pub(super) fn slope_breaks(
 pub(super) fn fit_parabola(t: &[f64], z: &[f64], at: f64) -> ([f64; 3], f64) {
     let span = t.last().zip(t.first()).map_or(1.0, |(b, a)| (b - a).max(1e-12));
     let base = z.first().copied().unwrap_or(0.0);
-    let mut m = [[0.0; 3]; 3];
-    let mut g = [0.0; 3];
+    let mut sums = NormalEquations::<3>::new(3);
     for (t, z) in t.iter().zip(z) {
         let s = (t - at) / span;
-        let row = [1.0, s, s * s];
-        for a in 0..3 {
-            g[a] += row[a] * (z - base);
-            for b in 0..3 {
-                m[a][b] += row[a] * row[b];
-            }
-        }
+        sums.add(&[1.0, s, s * s], z - base);
     }
-    let mut h = SymmetricMatrix::zeros(3);
-    for (a, row) in m.iter().enumerate() {
-        row.iter().enumerate().take(a + 1).for_each(|(b, x)| h.add(a, b, *x));
-    }
-    let x = h.cholesky().solve(&g);
+    let x = sums.solve();
     let left = |(t, z): (&f64, &f64)| {
         let s = (t - at) / span;
         (z - base - x[0] - (x[1] + x[2] * s) * s).powi(2)

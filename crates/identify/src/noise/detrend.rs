@@ -1,7 +1,7 @@
 //! Removes smooth trends from residuals, so that unmodelled smooth structure does not count as noise.
 
 use crate::block_averages::BlockAverages;
-use stylet_stats::linear_algebra::SymmetricMatrix;
+use stylet_stats::least_squares::NormalEquations;
 use stylet_stats::order_statistics::median;
 
 /// Length (s) of the windows in which a parabola is removed: unmodelled structure is smooth over it.
@@ -21,18 +21,11 @@ pub(super) fn detrended_residuals(b: &BlockAverages, e: &[f64]) -> Vec<f64> {
         if 2 * (to - from) >= length {
             let m = to - from;
             let x = |k: usize| 2.0 * (k - from) as f64 / m as f64 - 1.0;
-            let mut h = SymmetricMatrix::zeros(3);
-            let mut g = vec![0.0; 3];
+            let mut sums = NormalEquations::<3>::new(3);
             for k in (from..to).filter(|k| b.used[*k]) {
-                let row = [1.0, x(k), x(k) * x(k)];
-                for i in 0..3 {
-                    g[i] += row[i] * e[k];
-                    for j in 0..=i {
-                        h.add(i, j, row[i] * row[j]);
-                    }
-                }
+                sums.add(&[1.0, x(k), x(k) * x(k)], e[k]);
             }
-            let c = h.cholesky().solve(&g);
+            let c = sums.solve();
             let mut square = 0.0;
             for k in from..to {
                 out[k] = e[k] - c[0] - x(k) * (c[1] + x(k) * c[2]);

@@ -1,6 +1,6 @@
 //! Columns for time, position and force: as the readers find them, otherwise as suggested by contents and magnitudes.
 
-use super::magnitude::{epoch_unit, is_implausible, propose_units};
+use super::magnitude::{EPOCH_S, epoch_unit, is_implausible, propose_units};
 use super::scan::{ColumnScan, Scan};
 use super::{Candidate, Role, UnitProposal};
 use crate::column_map::{Column, ColumnMap};
@@ -9,14 +9,11 @@ use crate::error::RecordError;
 use crate::insertion_axis::project;
 use crate::text::layout::ColumnKind;
 use crate::text::rows::RowsRead;
+use crate::time_order::MIN_SAMPLE_NUMBERS;
 use crate::units::{Dimension, quantity_of, split_name};
 
 /// Share of the variance from which one of three components is used instead of all.
 const MAIN_COMPONENT_SHARE: f64 = 0.99;
-/// Consecutive integers from which on a time is a sample number.
-const MIN_SAMPLE_NUMBERS: f64 = 99.0;
-/// First seconds of a clock since 1970: 1973 to 2128.
-const EPOCH_S: (f64, f64) = (1e8, 5e9);
 
 /// The columns of a recording with the conversion of each row.
 pub(super) struct Chosen {
@@ -211,8 +208,7 @@ impl Chosen {
         let first_time = origin.map_or(column.first, |x| x as f64);
         let epoch = epoch_unit(first_time * found.scale)
             .filter(|_| role == Role::Time && found.kind == ColumnKind::Number);
-        let steps = (column.values.max(1) - 1) as f64;
-        let counts = role == Role::Time && steps >= MIN_SAMPLE_NUMBERS && column.is_counter();
+        let counts = role == Role::Time && column.values >= MIN_SAMPLE_NUMBERS && column.is_counter();
         if counts && !found.scale_is_given {
             reason = "it counts the samples: rate_hz, the samples per second, must be filled in".to_owned();
             self.counts_samples = true;

@@ -28,7 +28,7 @@ const TYPICAL_INTERVAL_S: f64 = 0.005;
 const INTERVALS_S: (f64, f64) = (1e-5, 0.5);
 
 /// First times (s since 1970) of recordings: 1998 to 2128.
-const EPOCH_S: (f64, f64) = (9e8, 5e9);
+pub(super) const EPOCH_S: (f64, f64) = (9e8, 5e9);
 
 /// Units with SI units per unit and their rarity: factors by which the magnitude must fit better than in a usual unit, as
 /// logarithms.

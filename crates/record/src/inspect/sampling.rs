@@ -1,12 +1,7 @@
 //! Sampling of a file: rate, bursts, gaps, steps back, restarts.
 
 use super::Sampling;
-use crate::time_order::{is_in_bursts, second_run_row};
-
-/// Least length of a gap in median intervals.
-const GAP_INTERVALS: f64 = 5.0;
-/// Consecutive integers from which a time column counts as a sample number.
-const MIN_SAMPLE_NUMBERS: usize = 100;
+use crate::time_order::{GAP_INTERVALS, MIN_SAMPLE_NUMBERS, is_in_bursts, second_run_row};
 
 /// The sampling of time stamps (s; NaN where a row has none). `to_s` are seconds per unit of the file, `line` gives the line of
 /// a row.

@@ -3,9 +3,8 @@
 use super::extent::Extent;
 use super::note::{QualityKind, QualityNote};
 use crate::sample_stream::{Quantity, SampleStream};
+use crate::time_order::GAP_INTERVALS;
 
-/// Least length of a gap in median intervals.
-const GAP_INTERVALS: f64 = 5.0;
 /// Least scatter of the intervals (standard deviation over median) for a note.
 const MIN_JITTER: f64 = 0.05;
 

@@ -238,6 +238,8 @@ pub struct RunReport {
     pub provenance: Provenance,
     /// Warnings about the data and repairs, shown first.
     pub notes: Vec<String>,
+    /// What was done with the data and is no reason to doubt them, such as conversions of units.
+    pub remarks: Vec<String>,
     /// Sample times in s, increasing.
     pub time_s: Vec<f64>,
     /// Tip position in m, positive into the tissue.

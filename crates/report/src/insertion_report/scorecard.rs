@@ -28,6 +28,7 @@ pub(super) fn section(report: &RunReport) -> Section {
     if !report.notes.is_empty() {
         section = section.warnings(report.notes.clone());
     }
+    section = section.texts(report.remarks.clone());
     let cards: Vec<Vec<Tile>> = report.combinations.iter().map(tiles).collect();
     if let [only] = cards.as_slice() {
         return section.tiles(only.clone());

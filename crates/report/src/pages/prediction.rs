@@ -59,6 +59,18 @@ pub fn summary_sentence(p: &Prediction) -> String {
     format!("{how}: {within}.")
 }
 
+/// A warning where recordings that made the model are predicted with it.
+#[must_use]
+pub fn training_sentence(p: &Prediction) -> Option<String> {
+    let made: Vec<&str> = p.recordings.iter().filter(|r| r.made_the_law).map(|r| r.name.as_str()).collect();
+    (!made.is_empty()).then(|| {
+        format!(
+            "The model was fitted to {}, so the error there says nothing about new recordings.",
+            made.join(", ")
+        )
+    })
+}
+
 /// Which group of recordings the band assumes.
 #[must_use]
 pub fn group_sentence(p: &Prediction) -> String {
@@ -210,7 +222,7 @@ fn overview(found: &PredictionResult) -> Section {
     if let Some(sentence) = refit_sentence(p) {
         section = section.text(sentence);
     }
-    let mut warnings = worse_than_baseline(p);
+    let mut warnings: Vec<String> = training_sentence(p).into_iter().chain(worse_than_baseline(p)).collect();
     if !p.held_out {
         warnings.push(
             "The group was fitted to the same recording, so the residual is smaller than for a new recording. With two or more \
@@ -266,4 +278,58 @@ fn residual(r: &RecordingPrediction, s: &PredictionCurves, floor_n: f64) -> Char
         .with_series(Series::line("residual", Colour::Blue, s.time_s.clone(), residual_n).width(1.0))
         .with_level(Level::dotted(2.0 * floor_n, "twice the noise"))
         .with_level(Level::dotted(-2.0 * floor_n, ""))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{page, training_sentence};
+    use stylet_diagnose::prediction::{Prediction, PredictionResult, RecordingPrediction};
+    use stylet_scenario::Scenario;
+
+    fn recording(name: &str, made_the_law: bool) -> RecordingPrediction {
+        RecordingPrediction {
+            name: name.to_owned(),
+            rmse_n: 0.02,
+            assumed_rmse_n: None,
+            band_coverage: 0.9,
+            peak_error_n: 0.0,
+            made_the_law,
+            surface_shift_m: None,
+            force_factor: None,
+            friction_factor: None,
+            puncture_factor: None,
+        }
+    }
+
+    #[test]
+    fn the_page_says_which_recordings_made_the_model() {
+        let of = |recordings: Vec<RecordingPrediction>| Prediction {
+            recordings,
+            rmse_n: 0.02,
+            assumed_rmse_n: None,
+            floor_n: 0.01,
+            band_coverage: 0.9,
+            varying: Vec::new(),
+            coverage_by_group: None,
+            band_includes: Vec::new(),
+            refit: None,
+            held_out: true,
+            baselines: Vec::new(),
+        };
+        let layer = "(thickness_m: 0.03, stiffness_n_per_m: 40.0, friction_ns_per_m2: 9000.0)";
+        let model = format!("Scenario(name: \"gel\", tissue: (layers: [{layer}]), motion: Recorded)");
+        let model = Scenario::parse("extended.ron", &model).expect("a scenario");
+        let page_of = |prediction: Prediction| {
+            let found = PredictionResult { prediction, curves: Vec::new() };
+            page(&model, "extended.ron", &found).to_html()
+        };
+        let new = of(vec![recording("new.csv", false)]);
+        assert_eq!(training_sentence(&new), None);
+        assert!(!page_of(new).contains("says nothing about new recordings"));
+        let old = of(vec![recording("a.csv", true), recording("new.csv", false), recording("b.csv", true)]);
+        let sentence =
+            "The model was fitted to a.csv, b.csv, so the error there says nothing about new recordings.";
+        assert_eq!(training_sentence(&old).as_deref(), Some(sentence));
+        assert!(page_of(old).contains(sentence));
+    }
 }

@@ -95,6 +95,7 @@ pub fn synthetic_run(combinations: usize) -> RunReport {
             hash: "9f86d081884c7d65".into(),
         },
         notes: Vec::new(),
+        remarks: Vec::new(),
         time_s,
         position_m,
         velocity_mps,

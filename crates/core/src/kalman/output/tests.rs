@@ -1,4 +1,5 @@
-use super::super::layer_estimator::D;
+use super::super::air_history::BaselineFit;
+use super::super::layer_estimator::{D, DRIFT, LINE};
 use super::super::shaft_friction::DryShaftFriction;
 use super::super::test_support::{advancing, inside, near, sample};
 use super::*;
@@ -218,4 +219,30 @@ fn the_complete_output_has_prediction_cusum_and_standard_deviations() {
     (air.output.used, air.in_tissue, air.output.error_n) = (true, false, 0.2);
     let out = air.complete_output(&sample(0.01, 1.3));
     assert_eq!((out.reconstructed_n, out.theta, out.sd), (0.0, [0.0; 2], [0.0; 3]));
+}
+
+/// A moving baseline whose subtracted drift and line were wrong by 0.05 N and by 0.1 N at this sample.
+fn with_moving_baseline(mut stylet: KalmanEnhancer) -> KalmanEnhancer {
+    stylet.estimator.set_baseline(&BaselineFit::default(), &stylet.noise);
+    stylet.estimator.elapsed_s = 5.0;
+    stylet.estimator.belief.x[DRIFT] = 0.01;
+    stylet.estimator.belief.x[LINE] = 0.1 / 0.0099;
+    stylet
+}
+
+#[test]
+fn friction_of_a_model_and_dry_friction_are_compared_with_the_force_without_a_moving_baseline() {
+    // The force lies 0.5 N above the baseline, all of which is friction just after a rupture.
+    let moved = Sample { force_n: 0.07 + 0.15 + 0.5, ..at(0.002) };
+    for (model_n, friction_n) in [(0.3, 0.3), (0.6, 0.5)] {
+        let mut stylet = with_moving_baseline(second());
+        stylet.base_law_failed = true;
+        stylet.dry_friction.rupture(0.0095, stylet.force_without_baseline_n(&moved));
+        (stylet.output.used, stylet.last_sample) = (true, moved);
+        stylet.write_output(&EnhanceConfig::default(), &moved);
+        // The offset of the sensor stays in the enhanced force.
+        near(stylet.output.enhanced_n, 0.07);
+        let found = stylet.apply_model_friction(&EnhanceConfig::default(), model_n);
+        near(found.expect("a model").0, 0.07 + 0.5 - friction_n);
+    }
 }

@@ -441,11 +441,13 @@ fn reports_come_after_twice_as_many_samples_each() {
 
 #[test]
 fn only_filters_that_are_not_finite_restart() {
+    let mut config = EnhanceConfig::default();
+    config.contact_search.min_noise_n = 5e-3;
     let restarted = |spoil: fn(&mut KalmanEnhancer)| {
         let mut stylet = inside();
         stylet.post_rupture = Some(stylet.estimator);
         spoil(&mut stylet);
-        stylet.restart_if_invalid(&step(), &sample(0.01, 0.4));
+        stylet.restart_if_invalid(&config, &step(), &sample(0.01, 0.4));
         stylet
     };
     let sound = restarted(|_| ());
@@ -454,11 +456,11 @@ fn only_filters_that_are_not_finite_restart() {
     assert_same(&sound.predictor.belief, &inside().predictor.belief);
     assert_same(&sound.estimator.belief, &inside().estimator.belief);
     for (variance, kept) in
-        [(f64::NAN, 1e-6), (f64::INFINITY, 1e-6), (1e12, 1e-6), (9e11, 9e11), (1e-13, 1e-13)]
+        [(f64::NAN, 2.5e-5), (f64::INFINITY, 2.5e-5), (1e12, 2.5e-5), (9e11, 9e11), (1e-13, 1e-13)]
     {
         let mut stylet = inside();
         stylet.noise.variance = variance;
-        stylet.restart_if_invalid(&step(), &sample(0.01, 0.4));
+        stylet.restart_if_invalid(&config, &step(), &sample(0.01, 0.4));
         near(stylet.noise.variance, kept);
     }
     // Predictor: level at the force, slopes on the scale of the force less the bias.

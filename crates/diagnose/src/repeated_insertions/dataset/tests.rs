@@ -153,7 +153,7 @@ fn specimens_in_one_file_are_split_by_columns() {
         .err()
         .map(|e| e.to_string())
         .unwrap_or_default();
-    assert!(text.contains("no column \"colour\"") && text.contains("specimen, time_s"), "{text}");
+    assert!(text.contains("no column \"colour\"") && text.contains("\"specimen\", \"time_s\""), "{text}");
     assert!(set.load_recordings(&[folder.0.join("nowhere.csv")], 2).is_err());
     let plain = Dataset { split_by: Vec::new(), ..set };
     let mut text = "time_s,position_m,force_n\n".to_owned();

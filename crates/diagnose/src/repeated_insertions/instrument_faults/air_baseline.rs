@@ -4,7 +4,8 @@
 use crate::repeated_insertions::segmented_recording::SegmentedRecording;
 use stylet_identify::insertion_phases::noise_n;
 use stylet_record::Recording;
-use stylet_stats::linear_algebra::{SymmetricMatrix, dot};
+use stylet_stats::least_squares::NormalEquations;
+use stylet_stats::linear_algebra::dot;
 use stylet_stats::{mean, median_of, rms};
 
 /// Share of the distance to the assumed surface that counts as air: the surface may be nearer than assumed.
@@ -40,17 +41,11 @@ pub fn fit_trend(t: &[f64], f: &[f64]) -> LinearTrend {
 
 /// Coefficients and residuals of a linear least-squares fit.
 pub fn least_squares<const N: usize>(rows: &[[f64; N]], y: &[f64]) -> (Vec<f64>, Vec<f64>) {
-    let mut a = SymmetricMatrix::zeros(N);
-    let mut b = [0.0; N];
+    let mut sums = NormalEquations::<N>::new(N);
     for (row, y) in rows.iter().zip(y) {
-        for i in 0..N {
-            b[i] += row[i] * y;
-            for j in i..N {
-                a.add(i, j, row[i] * row[j]);
-            }
-        }
+        sums.add(row, *y);
     }
-    let x = a.cholesky().solve(&b);
+    let x = sums.solve();
     let of = |row: &[f64; N]| row.iter().zip(&x).map(|(r, x)| r * x).sum::<f64>();
     let rest = rows.iter().zip(y).map(|(row, y)| y - of(row)).collect();
     (x, rest)
