@@ -26,14 +26,10 @@ const COARSENING_FACTOR: usize = 3;
 const INITIAL_NOISE_SHARE: f64 = 0.1;
 /// Weight of the prior scatter between days, in days.
 pub(super) const PRIOR_DAYS: f64 = 4.0;
-/// Iterations of the first fit from every start.
-const FIRST_TURNS: usize = 6;
-/// Of so many starts, one is screened further.
-const FIRST_SELECTION: usize = 3;
 /// Iterations of the screening fits, per noise update.
-const SCREENING_TURNS: [usize; 2] = [6, 10];
+const SCREENING_TURNS: [usize; 2] = [6, 6];
 /// Iterations of the fits that continue, per noise update.
-const CONTINUED_TURNS: [usize; 2] = [10, 20];
+const CONTINUED_TURNS: [usize; 2] = [6, 8];
 /// Number of starts that continue after screening.
 const CONTINUED_STARTS: usize = 8;
 /// Largest number of distinct optima that are refined.
@@ -300,13 +296,10 @@ pub fn multistart_fit(
     let drops: Vec<Vec<f64>> =
         recordings.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect()).collect();
     let coarse = with_initial_noise(fine.iter().map(|b| b.coarsened(COARSENING_FACTOR)).collect());
-    // Successive halving: most starts are dropped after few iterations.
-    let best = |models: &[Model], rounds: &[usize], count: usize| -> Vec<Model> {
-        fit_all(models, &coarse, &drops, rounds).into_iter().take(count).map(|f| f.1).collect()
-    };
-    let kept = CONTINUED_STARTS.max(starts.len() / FIRST_SELECTION);
-    let promising = best(starts, &[FIRST_TURNS], kept);
-    let promising = best(&promising, &SCREENING_TURNS, CONTINUED_STARTS);
+    // Most starts are dropped after screening.
+    let mut found = fit_all(starts, &coarse, &drops, &SCREENING_TURNS);
+    found.truncate(CONTINUED_STARTS);
+    let promising: Vec<Model> = found.into_iter().map(|f| f.1).collect();
     let found = fit_all(&promising, &coarse, &drops, &CONTINUED_TURNS);
     let errors: Vec<f64> = found.iter().map(|f| f.0).collect();
     let (agree, apart) = distinct_optima(&errors);

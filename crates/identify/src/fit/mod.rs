@@ -85,7 +85,7 @@ pub fn fit(model: &Model, data: &FitData, effort: Effort) -> Option<Fit> {
 /// As [`fit`], but stops when the objective would stay above `target_nats` even if every remaining step gained as much as the last one.
 #[must_use]
 pub fn fit_if_below(model: &Model, data: &FitData, effort: Effort, target_nats: f64) -> Option<Fit> {
-    Some(descend(model, data, effort, target_nats, update_scatter)?.0)
+    descend(model, data, effort, target_nats, update_scatter)
 }
 
 /// As [`fit`]; if ruptures scatter between recordings, also fits from zero scatter and returns the better result. Under a wide scatter, a
@@ -100,25 +100,23 @@ pub fn fit_from_zero_scatter(model: &Model, data: &FitData, effort: Effort) -> O
     }
     let held = Effort { max_iterations: 2, ..effort };
     let sharp =
-        descend(&none, data, held, f64::INFINITY, |_, _| ()).and_then(|f| fit(&f.0.model, data, effort));
+        descend(&none, data, held, f64::INFINITY, |_, _| ()).and_then(|f| fit(&f.model, data, effort));
     Some(sharp.filter(|f| f.nats() < wide.nats()).unwrap_or(wide))
 }
 
-/// Descends from `model`; `scatter` re-estimates the random-effect standard deviations after each step. Returns whether the descent
-/// ended because a step gained too little, not because its iterations were used up.
+/// Descends from `model`; `scatter` re-estimates the random-effect standard deviations after each step.
 fn descend(
     model: &Model,
     data: &FitData,
     effort: Effort,
     target_nats: f64,
     scatter: impl Fn(&mut Model, &mut Residuals),
-) -> Option<(Fit, bool)> {
+) -> Option<Fit> {
     let mut best = model.clone();
     clamp_to_bounds(&mut best);
     let mut at = residuals(&best, data)?;
     scatter(&mut best, &mut at);
     let mut damping = FIRST_DAMPING;
-    let mut stalled = false;
     for turn in 1..=effort.max_iterations {
         let linearization = Linearization::new(&best, data, &at);
         let before = at.nats;
@@ -145,10 +143,9 @@ fn descend(
         }
         let gain = before - at.nats;
         let reach = at.nats - gain * (effort.max_iterations - turn) as f64;
-        stalled = !gained || gain < effort.min_gain_nats;
-        if stalled || (turn > 1 && reach > target_nats) {
+        if !gained || gain < effort.min_gain_nats || (turn > 1 && reach > target_nats) {
             break;
         }
     }
-    Some((Fit { model: best, residuals: at }, stalled))
+    Some(Fit { model: best, residuals: at })
 }

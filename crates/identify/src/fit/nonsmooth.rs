@@ -1,8 +1,7 @@
 //! Continues a fit that stopped at a kink of the objective.
 
 use super::damped_step::{apply_step, damped_step};
-use super::scatter_update::update_scatter;
-use super::{Effort, FIRST_DAMPING, Fit, Linearization, MAX_DAMPING_TRIALS, descend};
+use super::{Effort, FIRST_DAMPING, Fit, Linearization, MAX_DAMPING_TRIALS, fit};
 use crate::likelihood::{FitData, residuals};
 use crate::model::Model;
 use stylet_stats::linear_algebra::dot;
@@ -13,17 +12,14 @@ const MIN_PREDICTED_GAIN_NATS: f64 = 1.0;
 /// Largest number of restarts from a kink.
 const MAX_RESTARTS: usize = 3;
 
-/// As [`fit`](super::fit), but restarts a descent that stalled where the linearization predicts a gain that no damped step achieves. A
-/// restart moves only the parameters whose individual steps improve the objective: stick-slip and presliding friction have kinks, and the
-/// derivative on one side of a kink is wrong on the other.
+/// As [`fit`], but restarts where the linearization predicts a gain that no damped step achieves. A restart moves only the parameters whose
+/// individual steps improve the objective: stick-slip and presliding friction have kinks, and the derivative on one side of a kink is wrong
+/// on the other.
 #[must_use]
 pub fn fit_nonsmooth(model: &Model, data: &FitData, effort: Effort) -> Option<Fit> {
-    let descent = |model: &Model| descend(model, data, effort, f64::INFINITY, update_scatter);
-    let (mut best, mut stalled) = descent(model)?;
+    let mut best = fit(model, data, effort)?;
     for _ in 0..MAX_RESTARTS {
-        let restart = || descent(&escape_kink(&best, data)?);
-        let Some((freed, again)) = stalled.then(restart).flatten() else { break };
-        stalled = again;
+        let Some(freed) = escape_kink(&best, data).and_then(|model| fit(&model, data, effort)) else { break };
         let gain = best.nats() - freed.nats();
         if gain > 0.0 {
             best = freed;

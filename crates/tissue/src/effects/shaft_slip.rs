@@ -20,12 +20,8 @@ const MAX_SUBSTEPS: f64 = 64.0;
 const MIN_HOLD_SHARE: f64 = 0.2;
 /// Smallest holding force in N.
 const MIN_HOLD_N: f64 = 1e-3;
-/// Most Newton iterations; two are typical.
+/// Most Newton iterations; two or three are typical.
 const MAX_ITERATIONS: usize = 80;
-/// Relative size of the last Newton step. Convergence is quadratic: the error after it is about its square times the exponent.
-const NEWTON_TOLERANCE: f64 = 1e-7;
-/// Size in m of the last Newton step of an unloaded contact.
-const NEWTON_TOLERANCE_M: f64 = 1e-14;
 
 /// A layer that adheres to the shaft, deforms, relaxes and slips by a power of the force.
 ///
@@ -334,20 +330,22 @@ impl ShaftSlip {
         let goal = c.w_m + dz_m;
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         let mut w = c.w_m;
+        let mut slipped = 0.0;
         for _ in 0..MAX_ITERATIONS {
             let force = spring.force(w) * retained_share - rest;
-            let (slip_m, slip_per_n) = slip(force);
-            let residual = w - goal + slip_m;
-            let change = residual / (1.0 + slip_per_n * spring.slope(w) * retained_share);
-            *(if residual > 0.0 { &mut high } else { &mut low }) = w;
-            w -= change;
-            if !(w >= low && w <= high) {
-                w = if low.is_finite() && high.is_finite() { 0.5 * (low + high) } else { goal };
-            } else if change.abs() <= NEWTON_TOLERANCE * w.abs() + NEWTON_TOLERANCE_M {
+            let (s, ds) = slip(force);
+            let residual = w - goal + s;
+            slipped = s;
+            let change = residual / (1.0 + ds * spring.slope(w) * retained_share);
+            if change.abs() <= 1e-15 + 1e-13 * w.abs() {
                 break;
             }
+            *(if residual > 0.0 { &mut high } else { &mut low }) = w;
+            w -= change;
+            if !(w > low && w < high) {
+                w = if low.is_finite() && high.is_finite() { 0.5 * (low + high) } else { goal };
+            }
         }
-        let slipped = goal - w;
         let now = spring.force(w);
         c.q_n = self.relaxed(c.q_n, weights, c.spring_n, now);
         c.slipped_m += slipped.max(0.0);
