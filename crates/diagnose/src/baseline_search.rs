@@ -41,13 +41,14 @@ pub(crate) fn search_with_baseline(
     progress: &mut impl FnMut(&str),
 ) -> (Search, PreparedRecordings) {
     progress("fitting the sensor's baseline");
+    let max_effects = |start: &Fit| if single { start.model.effects.len() + 1 } else { MAX_EFFECTS };
     let first = Baseline::fit(prepared, &base, &data, false).filter(|b| leaves_noise(&b.fit, &b.data));
     let is_dominant = |b: &Baseline| base.rms_n(&data) > DOMINANT_FACTOR * b.fit.rms_n(&b.data);
     let (from_base, baseline) = match first {
         Some(baseline) if is_dominant(&baseline) => (None, baseline),
         first => {
             let start = Search::from_fit(base.clone(), data.clone());
-            let from_base = Search::run_from(start.limited(single), prepared, progress);
+            let from_base = Search::run_from(start, max_effects(&base), prepared, progress);
             // No second search if other effects leave only noise and the baseline alone does not.
             let is_enough = first.is_none() && (single || leaves_noise(&from_base.best, &from_base.data));
             let exchanged = || if is_enough { None } else { Baseline::fit(prepared, &base, &data, true) };
@@ -58,8 +59,9 @@ pub(crate) fn search_with_baseline(
         }
     };
     let Baseline { prepared: with_steps, fit, data: data_of_baseline, stages } = baseline;
+    let most = max_effects(&fit);
     let start = Search { base, stages, ..Search::from_fit(fit, data_of_baseline) };
-    let mut from_baseline = Search::run_from(start.limited(single), &with_steps, progress);
+    let mut from_baseline = Search::run_from(start, most, &with_steps, progress);
     remove_weak_steps(&mut from_baseline, NoiseSource::LongMemory);
     let Some(from_base) = from_base else {
         return (from_baseline, with_steps);
@@ -79,7 +81,7 @@ pub(crate) fn continue_search(
     (found, prepared): (Search, PreparedRecordings),
     progress: &mut impl FnMut(&str),
 ) -> (Search, PreparedRecordings) {
-    let mut search = Search::run_from(Search { max_effects: MAX_EFFECTS, ..found }, &prepared, progress);
+    let mut search = Search::run_from(found, MAX_EFFECTS, &prepared, progress);
     remove_weak_steps(&mut search, NoiseSource::LongMemory);
     (search, prepared)
 }
@@ -205,12 +207,6 @@ fn may_pay(infos: &[&'static EffectInfo], base: &Fit, data: &FitData) -> bool {
 }
 
 impl Search {
-    /// The search, limited to one more effect if `single`.
-    fn limited(self, single: bool) -> Self {
-        let max_effects = if single { self.best.model.effects.len() + 1 } else { self.max_effects };
-        Self { max_effects, ..self }
-    }
-
     /// Removes baseline effects and steps whose gain is below their penalty; returns one selection step per remaining effect.
     fn prune_baseline(&mut self) -> Vec<SearchStage> {
         loop {

@@ -9,7 +9,7 @@ use crate::motion_period::has_confounded_clock;
 use crate::random_effect_selection::select_random_effects;
 use crate::reweighted_fit::fit_reweighted;
 use crate::selection_restarts::{MAX_BEHIND_SHARE, is_new_effect};
-pub use crate::selection_state::{MAX_EFFECTS, Search, SearchStage};
+pub use crate::selection_state::{Search, SearchStage};
 use stylet_identify::evidence_nats::Nats;
 use stylet_identify::fit::{Effort, Fit, fit, fit_if_below};
 use stylet_identify::likelihood::{FitData, residuals};
@@ -18,6 +18,8 @@ use stylet_identify::score_test::ScoreTest;
 use stylet_stats::parallel::*;
 use stylet_tissue::ChainStage;
 
+/// Largest number of selected effects.
+pub const MAX_EFFECTS: usize = 5;
 /// Candidates that get a short fit.
 const SHORT_FITS: usize = 8;
 /// Candidates that get a full fit after the short one.
@@ -41,13 +43,14 @@ impl Search {
         data: FitData,
         progress: &mut impl FnMut(&str),
     ) -> Self {
-        Self::run_from(Self::from_fit(base, data), prepared, progress)
+        Self::run_from(Self::from_fit(base, data), MAX_EFFECTS, prepared, progress)
     }
 
-    /// Continues the selection from a model that may already have effects.
+    /// Continues the selection from a model that may already have effects, up to `max_effects` of them.
     #[must_use]
     pub(crate) fn run_from(
         start: Self,
+        max_effects: usize,
         prepared: &PreparedRecordings,
         progress: &mut impl FnMut(&str),
     ) -> Self {
@@ -55,7 +58,7 @@ impl Search {
         loop {
             let count = search.best.model.effects.len();
             progress(&format!("searching for {} effect", if count == 0 { "an" } else { "another" }));
-            if count >= search.max_effects || !search.add_effect(prepared) {
+            if count >= max_effects || !search.add_effect(prepared) {
                 break;
             }
         }

@@ -75,7 +75,8 @@ pub(crate) fn search_from_any_start(
     Some(if is_data_better { data } else { assumed })
 }
 
-/// Selects random effects and searches for effects, or for a `single` one, from a fit of the base law; returns the search and the recordings it was fitted to.
+/// Selects random effects and searches for effects, or for a `single` one, from a fit of the base law; returns the search and the
+/// recordings it was fitted to.
 pub(crate) fn search_from(
     prepared: &PreparedRecordings,
     base: Fit,

@@ -9,9 +9,6 @@ use stylet_identify::model::EffectTerm;
 use stylet_identify::noise::NoiseSource;
 use stylet_stats::parallel::*;
 
-/// Largest number of selected effects.
-pub const MAX_EFFECTS: usize = 5;
-
 /// One step of the selection.
 #[derive(Clone, Debug)]
 pub struct SearchStage {
@@ -37,8 +34,6 @@ pub struct Search {
     pub data: FitData,
     /// Steps so far.
     pub stages: Vec<SearchStage>,
-    /// Largest number of effects.
-    pub(crate) max_effects: usize,
     /// Remaining restarts.
     pub(crate) restarts: usize,
     /// Remaining refits from the prior.
@@ -55,7 +50,6 @@ impl Search {
             best: fit,
             data,
             stages: Vec::new(),
-            max_effects: MAX_EFFECTS,
             restarts: 0,
             prior_refits: 0,
             tones_hz: Vec::new(),

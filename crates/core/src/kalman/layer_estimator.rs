@@ -336,8 +336,7 @@ impl LayerEstimator {
             before[2] = ruptured_friction;
         }
         if let Some(slot) = passed_layers.get_mut(self.passed_count) {
-            // A rupture may be located just before the estimated start.
-            *slot = [position_m - at_least(0.0, d), position_m, 0.0];
+            *slot = [position_m - d, position_m, 0.0];
         }
         self.start_m = position_m;
         (self.rupture_m, self.rupture_sd_m) = (position_m, sd_m);
@@ -489,8 +488,10 @@ impl LayerEstimator {
         let (mut whole, mut inside) = (0.0, 0.0);
         for (i, [start, end, b]) in passed_layers.iter().take(count).enumerate() {
             let b = if i + 1 == self.passed_count { self.belief.x[B_PREV].max(0.0) } else { *b };
-            whole += b * (end - start);
-            inside += b * at_least(0.0, at_most(end - start, z_m - start));
+            // A rupture may be located just before the estimated start of its layer.
+            let length_m = at_least(0.0, end - start);
+            whole += b * length_m;
+            inside += b * at_least(0.0, at_most(length_m, z_m - start));
         }
         // The sum is known better than its parts.
         let total = self.shaft_friction(deepest_m, noise).0.max(0.0);

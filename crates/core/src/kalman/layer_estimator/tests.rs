@@ -322,7 +322,7 @@ fn during_retraction_friction_is_shared_among_the_layers() {
     near(
         estimator.friction_during_retraction(&reversed, 0.011, 0.0345, &noise),
         (130.0 + 29.05) * 90.0 / 180.0,
-        0.02,
+        1e-9,
     );
     // Negative friction counts as zero; without any friction there is no scaling.
     estimator.tip_free = false;
