@@ -1,6 +1,7 @@
 //! Fits the base law to the recordings: assigns force drops to layers, then fits parameters and rupture times in turn.
 
 use crate::random_effect_selection::select_random_effects;
+use crate::verdict::leaves_slow_noise;
 use std::sync::Arc;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::{Effort, Fit, fit, fit_from_zero_scatter};
@@ -99,10 +100,11 @@ pub(crate) const COARSENING_FACTOR: usize = 3;
 /// Largest share of the objective that a coarse refit with random effects may leave for a full refit to follow.
 const MAX_OBJECTIVE_SHARE: f64 = 0.5;
 
-/// Whether a fit leaves only noise.
+/// Whether a fit leaves only noise: its RMS residual is that of the quiet parts, or what exceeds it is slow noise, which recordings do not
+/// have in common.
 pub(crate) fn leaves_noise(f: &Fit, data: &FitData) -> bool {
     let calm = data.with_estimated_noise(&f.residuals.residual_n, NoiseSource::Detrended);
-    f.rms_n(data) < MISFIT_FACTOR * calm.noise.sd_n()
+    f.rms_n(data) < MISFIT_FACTOR * calm.noise.sd_n() || leaves_slow_noise(f, &calm)
 }
 
 /// Effort of coarse fits and of the first rounds of a full one.

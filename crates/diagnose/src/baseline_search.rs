@@ -29,61 +29,81 @@ const MAX_ALTERNATIVES: usize = 6;
 /// Rounds in which one force drop changes between rupture and step.
 const MAX_EXCHANGES: usize = 3;
 
-/// Searches for effects from the base law and, if a baseline improves it, from the base law with the baseline. Returns the search with the
-/// better penalised likelihood, and the recordings it was fitted to.
-///
-/// With `single`, at most one effect is added, and a baseline only if it leaves nothing but noise; see [`continue_search`].
-pub(crate) fn search_with_baseline(
-    prepared: &PreparedRecordings,
-    base: Fit,
-    data: FitData,
-    single: bool,
-    progress: &mut impl FnMut(&str),
-) -> (Search, PreparedRecordings) {
-    progress("fitting the sensor's baseline");
-    let max_effects = |start: &Fit| if single { start.model.effects.len() + 1 } else { MAX_EFFECTS };
-    let first = Baseline::fit(prepared, &base, &data, false).filter(|b| leaves_noise(&b.fit, &b.data));
-    let is_dominant = |b: &Baseline| base.rms_n(&data) > DOMINANT_FACTOR * b.fit.rms_n(&b.data);
-    let (from_base, baseline) = match first {
-        Some(baseline) if is_dominant(&baseline) => (None, baseline),
-        first => {
-            let start = Search::from_fit(base.clone(), data.clone());
-            let from_base = Search::run_from(start, max_effects(&base), prepared, progress);
-            // No second search if other effects leave only noise and the baseline alone does not.
-            let is_enough = first.is_none() && (single || leaves_noise(&from_base.best, &from_base.data));
-            let exchanged = || if is_enough { None } else { Baseline::fit(prepared, &base, &data, true) };
-            let Some(baseline) = first.or_else(exchanged) else {
-                return (from_base, prepared.clone());
-            };
-            (Some(from_base), baseline)
-        }
-    };
-    let Baseline { prepared: with_steps, fit, data: data_of_baseline, stages } = baseline;
-    let most = max_effects(&fit);
-    let start = Search { base, stages, ..Search::from_fit(fit, data_of_baseline) };
-    let mut from_baseline = Search::run_from(start, most, &with_steps, progress);
-    remove_weak_steps(&mut from_baseline, NoiseSource::LongMemory);
-    let Some(from_base) = from_base else {
-        return (from_baseline, with_steps);
-    };
-    let penalty =
-        |s: &Search| bic_penalty(s.best.model.effect_parameter_count(), s.data.compared_block_count());
-    let needed = penalty(&from_baseline) - penalty(&from_base);
-    if likelihood_gain(&from_base.best, &from_baseline.best, &from_baseline.data).exceeds(needed) {
-        (from_baseline, with_steps)
-    } else {
-        (from_base, prepared.clone())
-    }
+/// A search for effects in two parts: a first effect, then further ones.
+pub(crate) struct EffectSearch {
+    pub search: Search,
+    /// The recordings that the search was fitted to, with the steps of its baseline.
+    pub prepared: PreparedRecordings,
+    /// Fit of the base law and its data; `None` if the search began with a baseline.
+    base: Option<(Fit, FitData)>,
 }
 
-/// Continues a search that was limited to a single effect.
-pub(crate) fn continue_search(
-    (found, prepared): (Search, PreparedRecordings),
-    progress: &mut impl FnMut(&str),
-) -> (Search, PreparedRecordings) {
-    let mut search = Search::run_from(found, MAX_EFFECTS, &prepared, progress);
-    remove_weak_steps(&mut search, NoiseSource::LongMemory);
-    (search, prepared)
+impl EffectSearch {
+    /// Searches for one effect: from the base law, and from the base law with a baseline if that leaves only noise.
+    pub(crate) fn first_effect(
+        prepared: &PreparedRecordings,
+        base: Fit,
+        data: FitData,
+        progress: &mut impl FnMut(&str),
+    ) -> Self {
+        progress("fitting the sensor's baseline");
+        let baseline = Baseline::fit(prepared, &base, &data, false);
+        let is_dominant = |b: &Baseline| base.rms_n(&data) > DOMINANT_FACTOR * b.fit.rms_n(&b.data);
+        let one_more = |mut found: Self, progress: &mut _| {
+            let most = found.search.best.model.effects.len() + 1;
+            found.search.add_effects(most, &found.prepared, progress);
+            found
+        };
+        let from_base = |progress: &mut _| {
+            let search = Search::start(base.clone(), data.clone());
+            let (prepared, base) = (prepared.clone(), Some((base.clone(), data.clone())));
+            one_more(Self { search, prepared, base }, progress)
+        };
+        match baseline {
+            None => from_base(progress),
+            Some(b) if is_dominant(&b) => one_more(Self::from_baseline(b, base.clone()), progress),
+            Some(b) => {
+                from_base(progress).or_better(one_more(Self::from_baseline(b, base.clone()), progress))
+            }
+        }
+    }
+
+    /// Searches for further effects. A search without a baseline that leaves structure is compared with one from a baseline that includes
+    /// steps instead of ruptures.
+    pub(crate) fn complete(mut self, progress: &mut impl FnMut(&str)) -> (Search, PreparedRecordings) {
+        self.add_further(progress);
+        if let Some((base, data)) = self.base.clone()
+            && !self.search.leaves_noise(&self.search.best)
+            && let Some(baseline) = Baseline::fit(&self.prepared, &base, &data, true)
+        {
+            let mut other = Self::from_baseline(baseline, base);
+            other.add_further(progress);
+            self = self.or_better(other);
+        }
+        (self.search, self.prepared)
+    }
+
+    fn from_baseline(baseline: Baseline, base: Fit) -> Self {
+        let Baseline { prepared, fit, data, stages } = baseline;
+        Self { search: Search { base, stages, ..Search::start(fit, data) }, prepared, base: None }
+    }
+
+    fn add_further(&mut self, progress: &mut impl FnMut(&str)) {
+        self.search.add_effects(MAX_EFFECTS, &self.prepared, progress);
+        self.search.finish(&self.prepared);
+        if self.base.is_none() {
+            remove_weak_steps(&mut self.search, NoiseSource::LongMemory);
+        }
+    }
+
+    /// The other search if its penalised likelihood is better.
+    fn or_better(self, other: Self) -> Self {
+        let penalty =
+            |s: &Search| bic_penalty(s.best.model.effect_parameter_count(), s.data.compared_block_count());
+        let needed = penalty(&other.search) - penalty(&self.search);
+        let gain = likelihood_gain(&self.search.best, &other.search.best, &other.search.data);
+        if gain.exceeds(needed) { other } else { self }
+    }
 }
 
 /// Recordings with their steps of the zero, fit, and data with the noise of the fit.

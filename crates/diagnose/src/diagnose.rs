@@ -18,7 +18,7 @@ use crate::identifiability::{advice, not_identifiable, visible_effects};
 use crate::input_checks::{
     CleanRecordings, NamedRecording, check_recordings, clean_recordings, force_outlier_notes,
 };
-use crate::measured_start::{search_from, search_from_any_start};
+use crate::measured_start::{first_effect, search_from_any_start};
 use crate::model_grade::grade;
 use crate::motion_period::common_motion_period_s;
 use crate::negligible_effects::{Negligible, negligible_effects};
@@ -289,8 +289,9 @@ pub(crate) fn simple_explanation(
     let CleanRecordings { mut recordings, raw, .. } = clean_recordings(recordings);
     let (prepared, _) = prepare(scenario, &mut recordings, &raw);
     let (base, data) = fit_base_law(&prepared)?;
-    let (search, _) = search_from(&prepared, base, data, true, progress);
-    search.leaves_noise(&search.best).then_some(search.best)
+    let mut found = first_effect(&prepared, base, data, progress);
+    found.search.finish(&found.prepared);
+    found.search.leaves_noise(&found.search.best).then_some(found.search.best)
 }
 
 /// Labels and covariance of the base parameters and of effects that are causes.

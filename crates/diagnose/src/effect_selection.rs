@@ -43,33 +43,42 @@ impl Search {
         data: FitData,
         progress: &mut impl FnMut(&str),
     ) -> Self {
-        Self::run_from(Self::from_fit(base, data), MAX_EFFECTS, prepared, progress)
+        let mut search = Self::start(base, data);
+        search.add_effects(MAX_EFFECTS, prepared, progress);
+        search.finish(prepared);
+        search
     }
 
-    /// Continues the selection from a model that may already have effects, up to `max_effects` of them.
-    #[must_use]
-    pub(crate) fn run_from(
-        start: Self,
+    /// A selection before its first step, from a fit that may already have effects.
+    pub(crate) fn start(fit: Fit, data: FitData) -> Self {
+        Self { restarts: MAX_RESTARTS, prior_refits: MAX_PRIOR_STAGES, ..Self::from_fit(fit, data) }
+    }
+
+    /// Adds effects until none gains enough, or the model has `max_effects` of them.
+    pub(crate) fn add_effects(
+        &mut self,
         max_effects: usize,
         prepared: &PreparedRecordings,
         progress: &mut impl FnMut(&str),
-    ) -> Self {
-        let mut search = Self { restarts: MAX_RESTARTS, prior_refits: MAX_PRIOR_STAGES, ..start };
-        loop {
-            let count = search.best.model.effects.len();
-            progress(&format!("searching for {} effect", if count == 0 { "an" } else { "another" }));
-            if count >= max_effects || !search.add_effect(prepared) {
-                break;
+    ) {
+        while self.best.model.effects.len() < max_effects {
+            let another = if self.best.model.effects.is_empty() { "an" } else { "another" };
+            progress(&format!("searching for {another} effect"));
+            if !self.add_effect(prepared) {
+                return;
             }
         }
-        search.prune();
-        if !search.best.model.effects.is_empty() {
-            (search.best, search.data) = select_random_effects(search.best.clone(), search.data.clone());
+    }
+
+    /// Removes superfluous effects, and selects random effects and geometry.
+    pub(crate) fn finish(&mut self, prepared: &PreparedRecordings) {
+        self.prune();
+        if !self.best.model.effects.is_empty() {
+            (self.best, self.data) = select_random_effects(self.best.clone(), self.data.clone());
         }
-        if fix_geometry(&mut search, prepared) {
-            search.prune();
+        if fix_geometry(self, prepared) {
+            self.prune();
         }
-        search
     }
 
     /// Continues the selection with reweighted fits ([`fit_reweighted`]), for data with an unmodelled effect.

@@ -6,7 +6,7 @@
 //! its tolerance is penalised like a shifted boundary.
 
 use crate::base_law_fit::{PreparedRecordings, with_updated_times};
-use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
+use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty};
 use crate::selection_state::Search;
 use stylet_identify::fit::{Effort, Fit, fit, fit_if_below};
 use stylet_identify::likelihood::FitData;
@@ -92,10 +92,8 @@ pub fn fix_geometry(search: &mut Search, prepared: &PreparedRecordings) -> bool 
         fits.iter().partition(|f| f.model.effects.len() > best.model.effects.len());
     let plain = best_of(&without_effect).filter(|f| penalised_nats(f, &search.data) < current);
     let reference = plain.as_ref().unwrap_or(best);
-    let extended = best_of(&with_effect).filter(|f| {
-        penalised_nats(f, &search.data) < penalised_nats(reference, &search.data)
-            && without_effect.iter().copied().chain([best]).all(|r| pays_under_own_noise(f, r, &search.data))
-    });
+    let extended = best_of(&with_effect)
+        .filter(|f| penalised_nats(f, &search.data) < penalised_nats(reference, &search.data));
     let effect_added = extended.is_some();
     if let Some(f) = extended.or(plain) {
         search.best = f;
@@ -114,12 +112,6 @@ fn constrain_base_law(search: &mut Search, prepared: &PreparedRecordings) {
     if let Some(f) = fit(&model, &search.data, Effort::FULL) {
         search.base = f;
     }
-}
-
-/// Whether the gain of a geometry effect exceeds its penalty also under the noise of the larger model.
-fn pays_under_own_noise(f: &Fit, reference: &Fit, data: &FitData) -> bool {
-    likelihood_gain(reference, f, data)
-        .exceeds(penalty_nats(&f.model, data) - penalty_nats(&reference.model, data))
 }
 
 /// The model with free geometry for confidence intervals, which would be too narrow with known boundaries. With an effect that moves

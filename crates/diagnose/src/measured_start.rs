@@ -1,7 +1,7 @@
 //! Chooses between start values from the scenario and start values from the data, for scenarios whose parameters are a rough guess.
 
 use crate::base_law_fit::{PreparedRecordings, fit_base_law, leaves_noise, refit_with_random_effects};
-use crate::baseline_search::{continue_search, search_with_baseline};
+use crate::baseline_search::EffectSearch;
 use crate::found_tissue::FoundTissue;
 use crate::random_effect_selection::select_random_effects;
 use crate::selection_state::Search;
@@ -23,9 +23,9 @@ const BETTER_FACTOR: f64 = 2.0;
 ///    tolerance of A, or if its RMS residual is larger by [`BETTER_FACTOR`].
 /// 2. Both are searched for a single effect. D is first if its base law leaves only noise, if its RMS residual is smaller by
 ///    [`BETTER_FACTOR`], or if it is smaller at all and the fit from A is out of tolerance. The first one that leaves only noise and ends
-///    on its side of the tolerance (A within, D out of it) is continued and returned.
-/// 3. Otherwise A is searched; if A is first, leaves only noise and is within tolerance, it is returned.
-/// 4. Otherwise D is searched too. The one that leaves only noise is returned; of two, the one with fewer effects (if equal: A, unless it
+///    on its side of the tolerance (A within, D out of it) is completed and returned.
+/// 3. Otherwise A is completed; if A is first, leaves only noise and is within tolerance, it is returned.
+/// 4. Otherwise D is completed too. The one that leaves only noise is returned; of two, the one with fewer effects (if equal: A, unless it
 ///    is out of tolerance); of none, A, unless the RMS residual of D is smaller by [`BETTER_FACTOR`].
 pub(crate) fn search_from_any_start(
     prepared: PreparedRecordings,
@@ -37,7 +37,7 @@ pub(crate) fn search_from_any_start(
     let ratio = |fit: &Fit, data_of_fit: &FitData| base.rms_n(&data) / fit.rms_n(data_of_fit);
     let measured = measured.filter(|(_, fit, data_of_fit)| ratio(fit, data_of_fit) * BETTER_FACTOR > 1.0);
     let Some((measured, fit, data_of_fit)) = measured else {
-        return Some(search_from(&prepared, base, data, false, progress));
+        return Some(first_effect(&prepared, base, data, progress).complete(progress));
     };
     let ratio = ratio(&fit, &data_of_fit);
     let explains = |found: &Search| found.leaves_noise(&found.best);
@@ -45,26 +45,29 @@ pub(crate) fn search_from_any_start(
     let is_out = |fit: &Fit| is_out_of_tolerance(&prepared.assumed, fit);
     let data_first =
         leaves_noise(&fit, &data_of_fit) || ratio > BETTER_FACTOR || (ratio > 1.0 && is_out(&base));
-    let from = |data_start: bool, single: bool, progress: &mut _| {
-        if data_start {
-            search_from(&measured, fit.clone(), data_of_fit.clone(), single, progress)
-        } else {
-            search_from(&prepared, base.clone(), data.clone(), single, progress)
-        }
+    let is_final = |found: &EffectSearch, data_start: bool| {
+        explains(&found.search) && is_out(&found.search.best) == data_start
     };
-    for data_start in [data_first, !data_first] {
-        let found = from(data_start, true, progress);
-        if explains(&found.0) && is_out(&found.0.best) == data_start {
-            return Some(continue_search(found, progress));
-        }
+    let from = |data_start: bool, progress: &mut _| {
+        let (prepared, base, data) =
+            if data_start { (&measured, &fit, &data_of_fit) } else { (&prepared, &base, &data) };
+        first_effect(prepared, base.clone(), data.clone(), progress)
+    };
+    let first = from(data_first, progress);
+    if is_final(&first, data_first) {
+        return Some(first.complete(progress));
     }
-    progress("searching for several effects");
-    let assumed = from(false, false, progress);
+    let second = from(!data_first, progress);
+    if is_final(&second, !data_first) {
+        return Some(second.complete(progress));
+    }
+    let (assumed, measured) = if data_first { (second, first) } else { (first, second) };
+    let assumed = assumed.complete(progress);
     if !data_first && explains(&assumed.0) && !is_out(&assumed.0.best) {
         return Some(assumed);
     }
     progress("searching from other numbers");
-    let data = from(true, false, progress);
+    let data = measured.complete(progress);
     let rms_n = |found: &Search| found.best.rms_n(&found.data);
     let is_data_better = match (explains(&assumed.0), explains(&data.0)) {
         (true, true) if is_out(&assumed.0.best) => count(&data.0) <= count(&assumed.0),
@@ -75,18 +78,16 @@ pub(crate) fn search_from_any_start(
     Some(if is_data_better { data } else { assumed })
 }
 
-/// Selects random effects and searches for effects, or for a `single` one, from a fit of the base law; returns the search and the
-/// recordings it was fitted to.
-pub(crate) fn search_from(
+/// Selects random effects and searches for one effect from a fit of the base law.
+pub(crate) fn first_effect(
     prepared: &PreparedRecordings,
     base: Fit,
     data: FitData,
-    single: bool,
     progress: &mut impl FnMut(&str),
-) -> (Search, PreparedRecordings) {
+) -> EffectSearch {
     let (base, data) = select_random_effects(base, data);
     let (base, data) = refit_with_random_effects(prepared, base, data);
-    search_with_baseline(prepared, base, data, single, progress)
+    EffectSearch::first_effect(prepared, base, data, progress)
 }
 
 /// The base law fitted from the layers found in the data; `None` if there are none, or if it is within tolerance of the assumed parameters.

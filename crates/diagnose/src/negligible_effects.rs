@@ -1,13 +1,10 @@
 //! Negligible effects: selected by the search, but too small to matter or without improvement on held-out recordings.
 
 use crate::diagnosis_json::Cause;
-use crate::held_out::{
-    FreeRunResidual, held_out_residuals_with_random_effects, pooled_rms, sample_noise_sd_n,
-};
+use crate::held_out::{FreeRunResidual, held_out_residuals_with_random_effects, pooled_rms};
 use crate::selection_state::Search;
 use stylet_identify::fit::{Effort, fit};
 use stylet_stats::parallel::*;
-use stylet_tissue::{ChainStage, EffectInfo, Proposal};
 
 /// A negligible effect.
 #[derive(Clone, Debug)]
@@ -18,16 +15,8 @@ pub struct Negligible {
     pub reason: String,
 }
 
-/// Smallest change of the held-out RMS by a cause, as a share of the noise.
-const MIN_RMS_CHANGE: f64 = 0.002;
-/// Share of the encoder noise below which the amplitude of a tissue motion is negligible.
-const MIN_MOTION_NOISE_SHARE: f64 = 0.1;
 /// Gain (nats per block) below which a cause must improve the held-out RMS.
 const STRONG_NATS_PER_BLOCK: f64 = 0.3;
-
-/// Assumed relative model error of a dominant cause, from noise of recorded motions and finite integration steps; a gain below its square
-/// may be this error.
-const MODEL_ERROR: f64 = 0.07;
 
 /// Negligible causes with their reasons; `nats_against_zero` are the values of [`Covariance::nats_against_zero`] by effect.
 ///
@@ -39,7 +28,6 @@ pub fn negligible_effects(
     causes: &[Cause],
     nats_against_zero: &[(String, f64)],
 ) -> Vec<Negligible> {
-    let noise_n = sample_noise_sd_n(&search.data);
     let free = search.best.model.free;
     let with_n = if free.recording_surface || free.recording_friction {
         pooled_rms(&held_out_residuals_with_random_effects(&search.best, &search.data), &search.data)
@@ -50,14 +38,9 @@ pub fn negligible_effects(
     let compared = search.data.compared_block_count() as f64;
     let assess = |c: &Cause| -> Option<Negligible> {
         let k = effects.iter().position(|e| e.info.id == c.effect)?;
-        let because = |reason: String| Some(Negligible { effect: c.effect.clone(), reason });
-        if let Some(reason) = unresolved(search, k) {
-            return because(reason);
-        }
+        let because = |reason: &str| Some(Negligible { effect: c.effect.clone(), reason: reason.to_owned() });
         if is_uncertain(c, nats_against_zero, search) {
-            return because(
-                "not significantly different from zero after a search over all effects".to_owned(),
-            );
+            return because("not significantly different from zero after a search over all effects");
         }
         let reduced = fit(
             &search.best.model.without_effect(k),
@@ -65,27 +48,16 @@ pub fn negligible_effects(
             Effort { max_iterations: 4, min_gain_nats: 0.5 },
         )?;
         let loss_nats = (reduced.nats() - search.best.nats()) / compared;
-        let explained =
-            causes.iter().filter(|o| o.effect != c.effect).map(|o| o.gain_nats).fold(0.0, f64::max);
-        if acts_in_every_sample(effects[k].info)
-            && loss_nats * compared < MODEL_ERROR * MODEL_ERROR * explained
-        {
-            return because("within the model error of a far greater cause".to_owned());
-        }
         if loss_nats > STRONG_NATS_PER_BLOCK {
             return None;
         }
         let without_n =
             pooled_rms(&held_out_residuals_with_random_effects(&reduced, &search.data), &search.data);
-        let gained = (without_n - with_n) / noise_n;
-        if gained >= MIN_RMS_CHANGE {
-            return None;
-        }
-        because(if gained < 0.0 {
-            "does not improve the prediction of held-out recordings".to_owned()
+        if without_n < with_n {
+            because("does not improve the prediction of held-out recordings")
         } else {
-            "changes the prediction of held-out recordings by less than 0.2 % of the noise".to_owned()
-        })
+            None
+        }
     };
     causes.par_iter().filter_map(assess).collect()
 }
@@ -95,26 +67,6 @@ fn is_uncertain(cause: &Cause, nats_against_zero: &[(String, f64)], search: &Sea
     let stage = search.stages.iter().find(|s| s.selected.is_some_and(|t| t.0 == cause.effect));
     let against = nats_against_zero.iter().find(|a| a.0 == cause.effect);
     stage.zip(against).is_some_and(|(stage, (_, nats))| *nats < stage.required_nats)
-}
-
-/// Whether an effect acts in every sample, not only at ruptures or breaks.
-fn acts_in_every_sample(info: &EffectInfo) -> bool {
-    !matches!(info.stage, ChainStage::Puncture | ChainStage::Release | ChainStage::Geometry)
-        && !matches!(info.proposal, Proposal::MembraneRupture | Proposal::RawSamples)
-}
-
-/// Reason why a parameter is below the resolution of the instrument, if it is.
-fn unresolved(search: &Search, k: usize) -> Option<String> {
-    let choice = &search.best.model.effects[k];
-    for (p, value) in choice.info.parameters.iter().zip(&choice.values) {
-        if p.strength && p.unit == "m" && choice.info.proposal == Proposal::TissueMotion {
-            let noise_m = search.data.recordings.iter().map(|b| b.motion.noise_m).fold(0.0, f64::max);
-            if *value < MIN_MOTION_NOISE_SHARE * noise_m {
-                return Some("below a tenth of the encoder noise".to_owned());
-            }
-        }
-    }
-    None
 }
 
 #[cfg(test)]

@@ -30,6 +30,8 @@ use stylet_tissue::EffectInfo;
 /// p-value below which the residual has structure. It is small because sums over pairs of recordings have longer tails than their skewness
 /// implies.
 const MAX_STRUCTURE_P_VALUE: f64 = 1e-6;
+/// Corrected p-value above which a residual has no structure that is worth a longer search.
+const MIN_NOISE_P_VALUE: f64 = 0.01;
 /// Unexplained share of the base law's residual variance above the noise from which the verdict is `unknown`.
 const MAX_UNEXPLAINED_SHARE: f64 = 0.1;
 /// Excess variance of the residual, in units of the noise variance, from which it counts as unexplained.
@@ -95,6 +97,17 @@ fn excess(data: &FitData, e: &[Vec<f64>]) -> f64 {
         }
     }
     sum / f64::max(n, 1.0) - 1.0
+}
+
+/// Whether the residual of a fit to several recordings is slow noise: not too large, without structure common to the recordings, without
+/// tones and without an outlier segment.
+pub(crate) fn leaves_slow_noise(f: &Fit, data: &FitData) -> bool {
+    let e = &f.residuals.residual_n;
+    data.recording_count() > 1
+        && excess(data, e) < MIN_EXCESS_SLOW
+        && outlier_segment_p_value(data, e).is_none()
+        && detect_tones(f, data).is_empty()
+        && test_residuals(f, data).coloured_noise.p_value > MIN_NOISE_P_VALUE
 }
 
 /// p-value of a tone whose power is `excess` times that of all other frequencies, in white noise (Fisher 1929).

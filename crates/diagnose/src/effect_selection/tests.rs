@@ -316,6 +316,8 @@ fn candidates_are_refitted_from_the_prior_when_the_leader_leaves_more_than_noise
         for e in &mut f.residuals.residual_n {
             e.iter_mut().enumerate().for_each(|(k, e)| *e += slow_n * (0.02 * k as f64).sin());
         }
+        let normalised = |e: &Vec<f64>| e.iter().map(|e| e / 0.01).collect();
+        f.residuals.innovations = f.residuals.residual_n.iter().map(normalised).collect();
         [f]
     };
     assert_eq!(started(&mut search, &leaves(0.0), &ranked, 2), (None, 2));
