@@ -3,8 +3,8 @@
 use super::air_history::{AirEvidence, BaselineFit, Form};
 use super::baseline::MIN_SAMPLES;
 use super::force_predictor::MotionStep;
-use super::gaussian::at_least;
 use super::state::{FAILED_MISFIT, KalmanEnhancer};
+use crate::bounds::{at_least, at_most};
 use crate::config::{Contact, EnhanceConfig};
 use crate::sample::{Baseline, Sample, ZeroStep};
 
@@ -57,7 +57,7 @@ impl KalmanEnhancer {
         let (variance, rho) = (history.noise_variance(), history.rho());
         let level_n = fit.x[0] - self.baseline.subtracted_n(sample.time_s, sample.position_m);
         let long_run = variance * excess * (1.0 + rho) / (1.0 - rho);
-        let count = (long_run / at_least(1e-300, fit.p[0][0])).clamp(1.0, fit.samples.max(1.0));
+        let count = at_least(1.0, at_most(fit.samples, long_run / at_least(1e-300, fit.p[0][0])));
         self.noise.restart_in_air(level_n, variance, rho, count, sample.force_n);
     }
 

@@ -15,8 +15,8 @@
 
 pub(super) use super::air_sums::Form;
 use super::air_sums::{Block, MIN_REMAINING_SHARE, Suffix, Totals};
-use super::gaussian::at_least;
 use super::noise_estimator::MAX_RHO;
+use crate::bounds::at_least;
 use crate::sample::{BaselineKind, Sample};
 
 /// Blocks per level, and in the last level (an odd number).

@@ -2,7 +2,7 @@
 //! zero.
 
 use super::air_history::{AirHistory, BaselineFit};
-use super::gaussian::at_least;
+use crate::bounds::at_least;
 use crate::sample::Sample;
 
 /// Samples between two evaluations, as a share of those so far.

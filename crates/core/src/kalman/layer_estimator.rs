@@ -17,8 +17,9 @@
 
 use super::air_history::BaselineFit;
 use super::force_predictor::MEMORY_M;
-use super::gaussian::{Gaussian, Innovation, MAX_VARIANCE_RATIO, at_least, at_most};
+use super::gaussian::{Gaussian, Innovation, MAX_VARIANCE_RATIO};
 use super::noise_estimator::NoiseEstimator;
+use crate::bounds::{at_least, at_most};
 use crate::sample::MAX_LAYERS;
 
 pub(crate) const D: usize = 0;

@@ -6,6 +6,7 @@ mod paper_estimation;
 mod paper_false_ruptures;
 mod paper_golden_hashes;
 mod paper_robustness;
+mod random_streams;
 mod scale_invariance;
 mod state_machine;
 mod stylet_detection;
