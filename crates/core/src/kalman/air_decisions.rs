@@ -94,7 +94,6 @@ impl KalmanEnhancer {
         (mut rise, mut sd): (f64, f64),
     ) {
         let bend = evidence.bend;
-        let (_, onset_m) = self.baseline.history.onset(bend.from);
         let moving = bend.form != Form::Constant;
         let fit = self.baseline.history.fit_before_bend(evidence, sample);
         if moving || self.baseline.moving {
@@ -107,12 +106,17 @@ impl KalmanEnhancer {
         if moving {
             self.set_estimator_baseline(&fit);
         }
-        // The onset is where the loading line crosses the baseline.
-        let variance = 4.0 * evidence.event_variance(&bend) + fit.p[0][0];
-        self.output.contact_m = Some(onset_m);
+        self.set_onset(evidence);
         self.output.contact_probability = evidence.contact_probability();
-        self.output.contact_sd_m = libm::sqrt(variance) / at_least(1e-300, bend.size);
         self.baseline.schedule();
+    }
+
+    /// Takes the position of the contact from the evidence.
+    fn set_onset(&mut self, evidence: &AirEvidence) {
+        let (onset_m, sd_m) = evidence.onset_m;
+        (self.output.contact_m, self.output.contact_sd_m) = (Some(onset_m), sd_m);
+        self.estimator.set_onset((onset_m, sd_m));
+        self.snapshot.set_onset((onset_m, sd_m));
     }
 
     /// Makes drift and line of a fit unknowns of the layer estimator.

@@ -96,6 +96,8 @@ pub(super) struct AirEvidence {
     pub(super) bend: Hypothesis,
     /// No event, with a constant offset.
     pub(super) constant_nats: f64,
+    /// Posterior mean of the bend's onset in m and its standard deviation.
+    pub(super) onset_m: (f64, f64),
     /// Excess of the block variance over that of the noise, 1 or more.
     pub(super) excess: f64,
     total: Totals,
@@ -379,6 +381,8 @@ impl AirHistory {
         let forms = [(Form::Constant, 0.0), (if line { Form::Line } else { Form::Drift }, moving)];
         let residual = |form: Form| total.residual(form);
         let (mut step, mut bend) = ([Hypothesis::none(); 2], [Hypothesis::none(); 2]);
+        // Log-likelihood of a bend at each block.
+        let mut onset_nats = [[f64::NEG_INFINITY; MAX_BLOCKS]; 2];
         let mut sums = Suffix::default();
         let variance = self.noise_variance();
         let least_step_n2 = MIN_STEP_SDS * MIN_STEP_SDS * variance;
@@ -400,6 +404,7 @@ impl AirHistory {
                     && size > 0.0
                     && (k == 0 || independent > MIN_INDEPENDENT)
                 {
+                    onset_nats[k][j] = 0.5 * gain;
                     bend[k].improve(Hypothesis { form: *form, nats: 0.5 * gain, from: j, size, sums });
                 }
             }
@@ -417,6 +422,7 @@ impl AirHistory {
                 step: Hypothesis::none(),
                 bend: Hypothesis::none(),
                 constant_nats: -0.5 * residual(Form::Constant) / excess,
+                onset_m: (0.0, 0.0),
                 excess,
                 total,
                 sample_weight,
@@ -435,7 +441,28 @@ impl AirHistory {
             });
             out.bend.improve(Hypothesis { nats: base + bend[k].nats / excess - event, ..bend[k] });
         }
+        let form = usize::from(out.bend.form != Form::Constant);
+        out.onset_m = self.onset_posterior(blocks, &onset_nats[form], excess);
         out
+    }
+
+    /// Mean and standard deviation of the position of a bend in m, with the log-likelihood `nats` of a bend at each block and a uniform
+    /// prior over the travel. Between two blocks the position is not resolved.
+    fn onset_posterior(&self, blocks: &[Block], nats: &[f64], excess: f64) -> (f64, f64) {
+        let most = nats.iter().copied().fold(f64::NEG_INFINITY, |a, b| at_least(a, b));
+        let (mut weight, mut mean, mut square) = (0.0, 0.0, 0.0);
+        for (pair, nats) in blocks.windows(2).zip(&nats[1..]) {
+            let cell_m = pair[1].position_m - pair[0].position_m;
+            let w = cell_m * libm::exp((nats - most) / excess);
+            if w > 0.0 {
+                let off = pair[0].position_m - mean;
+                weight += w;
+                mean += w / weight * off;
+                square += w * (off * (pair[0].position_m - mean) + cell_m * cell_m / 12.0);
+            }
+        }
+        let variance = if weight > 0.0 { square / weight } else { 0.0 };
+        (mean + self.origin.position_m, libm::sqrt(at_least(0.0, variance)))
     }
 
     /// Time and position of the last sample before block `from`.

@@ -31,6 +31,8 @@ pub(super) const BIAS: usize = 5;
 pub(super) const DRIFT: usize = 6;
 pub(super) const LINE: usize = 7;
 const N: usize = 8;
+/// Standard deviations (99.9 %) from the onset of the load beyond which a loading line does not begin there.
+const ONSET_SDS: f64 = 3.29;
 /// Unknowns in use where the baseline is constant.
 const WITHOUT_BASELINE: usize = 6;
 /// Innovation of the estimator.
@@ -62,6 +64,8 @@ pub(crate) struct LayerEstimator {
     /// Prior scale of the active layer's slope in N/m.
     slope_scale: f64,
     contact_drive: f64,
+    /// Position of the contact in m and its standard deviation, where the force in air tells.
+    onset_m: Option<(f64, f64)>,
     /// Depth, drive, force and time since contact of the previous sample.
     last: Option<[f64; 4]>,
     /// The baseline moves: drift and line are unknowns.
@@ -117,6 +121,7 @@ impl LayerEstimator {
             previous_start_sd_m: 0.0,
             slope_scale: slope,
             contact_drive: drive,
+            onset_m: None,
             last: None,
             moving_baseline: false,
             contact_m: start_m,
@@ -299,7 +304,7 @@ impl LayerEstimator {
             let [p, k, b, q, ..] = self.belief.x;
             let (force, slope) = (p + q * self.contact_drive, k + b * self.contact_drive);
             if force > 0.0 && slope > 0.0 {
-                depth_at_contact = (force / slope).min(d);
+                depth_at_contact = self.depth_at_contact(force / slope).min(d);
                 let g = &self.belief.p;
                 let u0 = self.contact_drive;
                 let variance = (g[D][D] + 2.0 * u0 * g[K_PREV][D] + u0 * u0 * g[K_PREV][K_PREV]).max(1e-6);
@@ -346,6 +351,22 @@ impl LayerEstimator {
         self.last = None;
         self.initial_log_densities =
             [self.log_density_of_free(true, noise), self.log_density_of_free(false, noise)];
+    }
+
+    /// Sets the position of the contact that follows from the force in air, with its standard deviation.
+    pub(super) fn set_onset(&mut self, onset_m: (f64, f64)) {
+        self.onset_m = Some(onset_m);
+    }
+
+    /// Depth in m at which the contact was detected: where the loading line of the whole layer meets the baseline, which is accurate if the
+    /// base law holds, or the onset of the load where that is incompatible. In tissue that relaxes the loading curve is not straight.
+    fn depth_at_contact(&self, along_line_m: f64) -> f64 {
+        match self.onset_m {
+            Some((onset_m, sd_m)) if (self.start_m - along_line_m - onset_m).abs() > ONSET_SDS * sd_m => {
+                at_least(0.0, self.start_m - onset_m)
+            }
+            _ => along_line_m,
+        }
     }
 
     /// Reverts the free-tip assumption after a drop: moves half of the slope, with that sd, from friction to stiffness.

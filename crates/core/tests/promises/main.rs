@@ -17,5 +17,6 @@ mod stylet_free_tip;
 mod stylet_intervals;
 mod stylet_numerical_validity;
 mod stylet_offsets;
+mod stylet_relaxation;
 mod support;
 mod time_jumps;
