@@ -1,7 +1,8 @@
 //! Decisions in air from the evidence of [`super::air_history`]: contact, steps of the sensor's zero, form of the baseline.
 
-use super::air_history::{AirEvidence, BaselineFit, Form};
+use super::air_history::{AirEvidence, Form};
 use super::baseline::MIN_SAMPLES;
+use super::baseline_fit::BaselineFit;
 use super::force_predictor::MotionStep;
 use super::state::{FAILED_MISFIT, KalmanEnhancer};
 use crate::bounds::{at_least, at_most};
