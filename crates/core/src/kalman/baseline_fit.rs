@@ -91,7 +91,8 @@ impl AirHistory {
         let rate = if form == Form::Drift { total.tf / total.tt } else { total.zf / total.zz };
         let speed = libm::sqrt(total.zz / total.tt);
         let (rate_s, rate_m) = if form == Form::Drift { (rate, rate / speed) } else { (rate * speed, rate) };
-        let squared = |x: f64| 1.0 / at_least(1e-300, x * x);
+        // Bounded so that products of two do not overflow.
+        let squared = |x: f64| 1.0 / at_least(1e-100, x * x);
         let (pd, pl) = (squared(rate_s), squared(rate_m));
         let (a, c) = (total.tt + pd, total.zz + pl);
         let b = total.tz;
