@@ -181,5 +181,5 @@ fn after_a_restart_of_the_clock_the_contact_is_of_the_last_insertion() -> Result
         })
         .collect();
     let config = EnhancerConfigFile::default();
-    compare_outputs("paused", &paused, &config, &[Model::MultiLayer], None, &TABLES)
+    compare_outputs("paused", &paused, &config, &[Model::MultiLayer], None, &ALL)
 }

@@ -66,9 +66,9 @@ pub struct Trace {
     pub first_detection: usize,
     /// Index of the first value of the columns since the last restart.
     pub first_sample: usize,
-    /// Number of samples whose events were recorded, and the number before the last restart. Unlike the columns, which may hold a selection,
-    /// these count all samples.
+    /// Number of samples whose events were recorded: all, also where the columns hold a selection.
     pub recorded: usize,
+    /// As `recorded`, before the last restart.
     pub recorded_before_restart: usize,
 }
 

@@ -404,7 +404,7 @@ impl AirHistory {
     /// Mean and standard deviation of the position of a bend in m, with the log-likelihood `nats` of a bend at each block and a uniform
     /// prior over the travel. Between two blocks the position is not resolved.
     fn onset_posterior(&self, blocks: &[Block], nats: &[f64], excess: f64) -> (f64, f64) {
-        let most = nats.iter().copied().fold(f64::NEG_INFINITY, |a, b| at_least(a, b));
+        let most = nats.iter().copied().fold(f64::NEG_INFINITY, at_least);
         let (mut weight, mut mean, mut square) = (0.0, 0.0, 0.0);
         for (pair, nats) in blocks.windows(2).zip(&nats[1..]) {
             let cell_m = pair[1].position_m - pair[0].position_m;
