@@ -168,3 +168,18 @@ fn a_longer_one_gives_the_same_tables_and_a_report_that_says_what_it_shows() -> 
     )?;
     compare_outputs("long, compared", &log(50_000, false), &of(paper), &BOTH, None, &TABLES)
 }
+
+#[test]
+fn after_a_restart_of_the_clock_the_contact_is_of_the_last_insertion() -> Result<(), Error> {
+    // A quarter of an hour between two insertions of 10 s.
+    let paused: String = log(20_000, true)
+        .lines()
+        .enumerate()
+        .map(|(k, line)| match line.split_once(',') {
+            Some((_, rest)) if k > 10_000 => format!("{:.3},{rest}\n", (k - 1) as f64 * 1e-3 + 900.0),
+            _ => format!("{line}\n"),
+        })
+        .collect();
+    let config = EnhancerConfigFile::default();
+    compare_outputs("paused", &paused, &config, &[Model::MultiLayer], None, &ALL)
+}

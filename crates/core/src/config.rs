@@ -3,7 +3,11 @@
 //! \[S\] is the supplement of Ferro, Gaz, Anzidei, Vendittelli 2021, \[L\] the tuning published with
 //! the authors' laboratory software (facts only), \[D\] a completion derived for this project.
 
+use crate::bounds::at_most;
 use alloc::vec::Vec;
+
+/// Largest speed in m/s that `Stylet` uses; faster samples are logging errors.
+pub(crate) const MAX_SPEED_MPS: f64 = 2.0;
 
 /// Regressor of a layer's force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -229,7 +233,7 @@ pub struct ContactConfig {
     pub noise_sds: f64,
     /// Consecutive samples above the threshold.
     pub samples: usize,
-    /// Lower bound on the standard deviation of the noise in N, for data without noise.
+    /// Lower bound on the standard deviation of the noise in N, for data without noise. `Stylet` limits it to 1e-9 to 1e5.
     pub min_noise_n: f64,
     /// Time in air, in s, for learning bias and noise before contact can be declared.
     pub learn_s: f64,
@@ -407,6 +411,18 @@ impl EnhanceConfig {
             }
             chosen => chosen,
         }
+    }
+
+    /// Speeds of `Stylet` at most [`MAX_SPEED_MPS`]: larger ones mean the same, and their squares may overflow.
+    pub(crate) fn with_limited_speeds(mut self) -> Self {
+        self.drop.standstill_mps = at_most(MAX_SPEED_MPS, self.drop.standstill_mps);
+        match &mut self.stylet.friction_law {
+            FrictionLaw::Auto | FrictionLaw::Viscous => {}
+            FrictionLaw::CoulombViscous { dry_mps } | FrictionLaw::Presliding { dry_mps, .. } => {
+                *dry_mps = at_most(MAX_SPEED_MPS, *dry_mps);
+            }
+        }
+        self
     }
 }
 

@@ -49,6 +49,7 @@ impl<B: AsRef<[Sample]> + AsMut<[Sample]>> Enhancer<B> {
     pub fn with_units(config: EnhanceConfig, surface_m: f64, units: Units, storage: B) -> Self {
         let surface_m = surface_m / units.length_m;
         let core = if config.active_algorithm() == Algorithm::Stylet {
+            let config = config.with_limited_speeds();
             Core::Stylet { kalman: KalmanEnhancer::new(&config, surface_m), config }
         } else {
             Core::Paper { paper: PaperEnhancer::new(config, surface_m), ring: SampleRing::new(storage) }

@@ -21,6 +21,7 @@
 
 extern crate alloc;
 
+mod bounds;
 pub mod config;
 mod enhancer;
 mod kalman;

@@ -129,7 +129,7 @@ impl<'a> Covariance<'a> {
         let all = variance(&self.factor);
         let mut weighted_squares = 0.0;
         for (increased, freedom) in &self.with_increased_variance {
-            let part = ((variance(increased) - all) / VARIANCE_INCREASE).clamp(0.0, all);
+            let part = ((variance(increased) - all) / VARIANCE_INCREASE).max(0.0).min(all);
             weighted_squares += part * part / freedom;
         }
         // Mean and scatter of the variance under bootstrap estimates of the noise.

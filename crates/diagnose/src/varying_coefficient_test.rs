@@ -107,9 +107,10 @@ fn force(score_test: &ScoreTest<'_>, effect: usize) -> Option<(Forces, Forces)> 
 fn interaction_column(forces: &[Vec<f64>], feature: &[Vec<f64>]) -> Forces {
     let mut all: Vec<f64> = feature.iter().flatten().copied().collect();
     let (low, high) = (quantile(&mut all, CLIP_QUANTILE), quantile(&mut all, 1.0 - CLIP_QUANTILE));
-    all.iter_mut().for_each(|x| *x = x.clamp(low, high));
+    let cut = |x: f64| x.max(low).min(high);
+    all.iter_mut().for_each(|x| *x = cut(*x));
     let (mean, sd) = (stylet_stats::mean(&all), stylet_stats::sd(&all));
-    let standardised = |x: f64| if sd > 0.0 { (x.clamp(low, high) - mean) / sd } else { 0.0 };
+    let standardised = |x: f64| if sd > 0.0 { (cut(x) - mean) / sd } else { 0.0 };
     forces
         .iter()
         .zip(feature)

@@ -23,7 +23,7 @@ impl LayerTruth {
     /// Length of needle inside the layer (m) with the tip at `z_m`.
     #[must_use]
     pub fn length_inside_m(&self, z_m: f64) -> f64 {
-        (z_m - self.front_m).clamp(0.0, self.thickness_m)
+        (z_m - self.front_m).min(self.thickness_m).max(0.0)
     }
 }
 
@@ -100,6 +100,16 @@ impl Truth {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_layer_without_thickness_holds_no_needle() {
+        for thickness_m in [0.0, -0.001, f64::NAN] {
+            let layer =
+                LayerTruth { front_m: 0.01, thickness_m, stiffness_n_per_m: 1.0, friction_ns_per_m2: 1.0 };
+            assert_eq!(layer.length_inside_m(0.005), 0.0);
+            assert!(thickness_m.is_nan() || layer.length_inside_m(0.02) == 0.0);
+        }
+    }
 
     #[test]
     fn ground_truth_of_another_length_than_the_recording_is_refused() {

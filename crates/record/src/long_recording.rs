@@ -418,16 +418,18 @@ impl LongRecording {
         Ok(())
     }
 
-    /// Time (s) of the first sample at or beyond this position.
+    /// Time (s) of the first sample at or beyond this position, from the sample with index `first` on.
     ///
     /// # Errors
     /// [`RecordError::TemporaryFile`].
-    pub fn first_time_beyond_s(&self, position_m: f64) -> Result<Option<f64>, RecordError> {
-        let mut found = None;
+    pub fn first_time_beyond_s(&self, first: usize, position_m: f64) -> Result<Option<f64>, RecordError> {
+        let (mut found, mut left) = (None, first);
         self.for_each_block([Quantity::Time, Quantity::Position], |[time_s, at_m]| {
             if found.is_none() {
-                found = at_m.iter().position(|z| *z >= position_m).map(|at| time_s[at]);
+                let later = time_s.iter().zip(at_m).skip(left);
+                found = later.filter(|(_, z)| **z >= position_m).map(|(t, _)| *t).next();
             }
+            left = left.saturating_sub(time_s.len());
         })?;
         Ok(found)
     }

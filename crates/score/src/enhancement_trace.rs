@@ -66,6 +66,10 @@ pub struct Trace {
     pub first_detection: usize,
     /// Index of the first value of the columns since the last restart.
     pub first_sample: usize,
+    /// Number of samples whose events were recorded: all, also where the columns hold a selection.
+    pub recorded: usize,
+    /// As `recorded`, before the last restart.
+    pub recorded_before_restart: usize,
 }
 
 impl Trace {
@@ -132,8 +136,9 @@ impl Trace {
         }
         trace.contact = assessor.finish(config.contact);
         trace.model_rejected_s = core.model_rejected_s();
+        let mut since_restart = recording.samples().skip(trace.recorded_before_restart);
         trace.contact_s =
-            trace.contact_m.and_then(|z| recording.samples().find(|s| s.position_m >= z)).map(|s| s.time_s);
+            trace.contact_m.and_then(|z| since_restart.find(|s| s.position_m >= z)).map(|s| s.time_s);
         trace
     }
 
@@ -176,7 +181,9 @@ impl Trace {
             self.restarts += 1;
             self.first_estimate = self.estimates.len();
             self.first_detection = self.detections.len();
+            self.recorded_before_restart = self.recorded;
         }
+        self.recorded += 1;
         if let Some(step) = out.zero_step {
             // A step of the zero that was first declared as a rupture.
             if let Some(layer) = step.withdrawn {

@@ -76,7 +76,8 @@ pub fn enhance_long_recording(
     }
     for run in &mut runs {
         if let Some(contact_m) = run.trace.contact_m {
-            run.trace.contact_s = recording.first_time_beyond_s(contact_m)?;
+            let first = run.trace.recorded_before_restart;
+            run.trace.contact_s = recording.first_time_beyond_s(first, contact_m)?;
         }
     }
     let duration_s = recording.duration_s()?;

@@ -1,10 +1,11 @@
 //! Decisions in air from the evidence of [`super::air_history`]: contact, steps of the sensor's zero, form of the baseline.
 
-use super::air_history::{AirEvidence, BaselineFit, Form};
+use super::air_history::{AirEvidence, Form};
 use super::baseline::MIN_SAMPLES;
+use super::baseline_fit::BaselineFit;
 use super::force_predictor::MotionStep;
-use super::gaussian::at_least;
 use super::state::{FAILED_MISFIT, KalmanEnhancer};
+use crate::bounds::{at_least, at_most};
 use crate::config::{Contact, EnhanceConfig};
 use crate::sample::{Baseline, Sample, ZeroStep};
 
@@ -57,7 +58,7 @@ impl KalmanEnhancer {
         let (variance, rho) = (history.noise_variance(), history.rho());
         let level_n = fit.x[0] - self.baseline.subtracted_n(sample.time_s, sample.position_m);
         let long_run = variance * excess * (1.0 + rho) / (1.0 - rho);
-        let count = (long_run / at_least(1e-300, fit.p[0][0])).clamp(1.0, fit.samples.max(1.0));
+        let count = at_least(1.0, at_most(fit.samples, long_run / at_least(1e-300, fit.p[0][0])));
         self.noise.restart_in_air(level_n, variance, rho, count, sample.force_n);
     }
 
@@ -94,7 +95,6 @@ impl KalmanEnhancer {
         (mut rise, mut sd): (f64, f64),
     ) {
         let bend = evidence.bend;
-        let (_, onset_m) = self.baseline.history.onset(bend.from);
         let moving = bend.form != Form::Constant;
         let fit = self.baseline.history.fit_before_bend(evidence, sample);
         if moving || self.baseline.moving {
@@ -107,12 +107,17 @@ impl KalmanEnhancer {
         if moving {
             self.set_estimator_baseline(&fit);
         }
-        // The onset is where the loading line crosses the baseline.
-        let variance = 4.0 * evidence.event_variance(&bend) + fit.p[0][0];
-        self.output.contact_m = Some(onset_m);
+        self.set_onset(evidence);
         self.output.contact_probability = evidence.contact_probability();
-        self.output.contact_sd_m = libm::sqrt(variance) / at_least(1e-300, bend.size);
         self.baseline.schedule();
+    }
+
+    /// Takes the position of the contact from the evidence.
+    fn set_onset(&mut self, evidence: &AirEvidence) {
+        let (onset_m, sd_m) = evidence.onset_m;
+        (self.output.contact_m, self.output.contact_sd_m) = (Some(onset_m), sd_m);
+        self.estimator.set_onset((onset_m, sd_m));
+        self.snapshot.set_onset((onset_m, sd_m));
     }
 
     /// Makes drift and line of a fit unknowns of the layer estimator.

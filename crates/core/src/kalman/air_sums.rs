@@ -1,6 +1,6 @@
 //! Weighted sums over block averages, and regressions from them.
 
-use super::gaussian::at_least;
+use crate::bounds::at_least;
 
 /// Share of a regressor's square that projection must leave.
 pub(super) const MIN_REMAINING_SHARE: f64 = 1e-9;

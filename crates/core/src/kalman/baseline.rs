@@ -1,8 +1,9 @@
 //! Baseline in air: its history, the part subtracted from the force, and the state of the decisions on contact and steps of the
 //! zero.
 
-use super::air_history::{AirHistory, BaselineFit};
-use super::gaussian::at_least;
+use super::air_history::AirHistory;
+use super::baseline_fit::BaselineFit;
+use crate::bounds::at_least;
 use crate::sample::Sample;
 
 /// Samples between two evaluations, as a share of those so far.

@@ -4,10 +4,10 @@ use super::air_history::Form;
 use super::cusum::CusumBank;
 use super::force_predictor::{self, ForcePredictor, MotionStep};
 use super::free_tip::{FreeTipDetector, OPERATIONS_PER_BEND_TEST};
-use super::gaussian::at_least;
 use super::layer_estimator::LayerEstimator;
 use super::rupture_detection::SURE_DROP_SDS;
 use super::state::{FAILED_MISFIT, KalmanEnhancer, MAX_STIFFNESS_N_PER_M};
+use crate::bounds::at_least;
 use crate::config::{Contact, EnhanceConfig};
 use crate::sample::Sample;
 

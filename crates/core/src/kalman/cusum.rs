@@ -6,7 +6,7 @@
 //! eq. 2.57) the mean number of samples between false alarms is `(exp(h + 1.166 mu) - h - 1.166 mu - 1) 2/mu²`; `h` follows
 //! from the configured false-alarm rate, of which each sum takes a third.
 
-use super::gaussian::at_least;
+use crate::bounds::at_least;
 
 /// Shifts that the sums are tuned to, in standard deviations of an innovation.
 const SHIFTS: [f64; 3] = [1.0, 2.0, 4.0];

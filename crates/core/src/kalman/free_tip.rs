@@ -15,9 +15,9 @@
 //! only upward bends count: the loading curve of a layer is straight, and a drop may be its rupture.
 
 use super::cusum::CusumBank;
-use super::gaussian::at_least;
 use super::layer_estimator::{B, B_PREV, K, LayerEstimator, PassedLayers};
 use super::noise_estimator::NoiseEstimator;
+use crate::bounds::at_least;
 
 /// Odds at which the tip is taken to be free.
 const ODDS: f64 = 20.0;

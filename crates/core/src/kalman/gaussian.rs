@@ -1,6 +1,8 @@
 //! Kalman filter for a few unknowns with scalar measurements, shared by force predictor and layer estimator.
 #![allow(clippy::needless_range_loop, reason = "matrices read best with their indices")]
 
+use crate::bounds::at_least;
+
 /// Mean and covariance of `N` unknowns. Only the lower triangle of the covariance is kept, in units of a noise variance
 /// that the caller holds, so that gains do not change when the noise is re-estimated.
 #[derive(Clone, Copy, Debug)]
@@ -84,6 +86,7 @@ impl<const N: usize> Gaussian<N> {
     pub(crate) fn leading_update<const R: usize>(&mut self, innovation: &Innovation<N>) {
         let Innovation { e, s, ph } = innovation;
         let gain = 1.0 / s;
+        let mut lost = false;
         for i in 0..R {
             let k = ph[i] * gain;
             self.x[i] += k * e;
@@ -92,7 +95,24 @@ impl<const N: usize> Gaussian<N> {
             }
             // Rounding must not make a small variance negative.
             let variance = self.p[i][i] - k * ph[i];
+            lost |= variance < LOST_SHARE * self.p[i][i];
             self.p[i][i] = at_least(MIN_VARIANCE, variance);
+        }
+        if lost {
+            self.restore_definiteness();
+        }
+    }
+
+    /// Removes all correlations if rounding has made them larger than the variances allow.
+    #[cold]
+    #[inline(never)]
+    fn restore_definiteness(&mut self) {
+        if !self.is_positive_definite() {
+            for i in 0..N {
+                for j in 0..i {
+                    self.p[i][j] = 0.0;
+                }
+            }
         }
     }
 
@@ -142,7 +162,8 @@ impl<const N: usize> Gaussian<N> {
     #[inline(always)]
     pub(crate) fn add_multiple(&mut self, i: usize, j: usize, factor: f64) {
         self.x[i] += factor * self.x[j];
-        self.p[i][i] += factor * (2.0 * self.cov(i, j) + factor * self.p[j][j]);
+        let variance = self.p[i][i] + factor * (2.0 * self.cov(i, j) + factor * self.p[j][j]);
+        self.p[i][i] = at_least(MIN_VARIANCE, variance);
         for k in 0..N {
             if k != i {
                 let more = factor * self.cov(j, k);
@@ -152,6 +173,9 @@ impl<const N: usize> Gaussian<N> {
                     self.p[k][i] += more;
                 }
             }
+        }
+        if variance < MIN_VARIANCE {
+            self.restore_definiteness();
         }
     }
 
@@ -186,23 +210,14 @@ impl<const N: usize> Gaussian<N> {
     }
 }
 
-/// The larger of the two; the bound if `x` is NaN. One instruction, where `f64::max` takes several.
-#[inline(always)]
-pub(crate) fn at_least(bound: f64, x: f64) -> f64 {
-    if x > bound { x } else { bound }
-}
-
-/// The smaller of the two; the bound if `x` is NaN.
-#[inline(always)]
-pub(crate) fn at_most(bound: f64, x: f64) -> f64 {
-    if x < bound { x } else { bound }
-}
-
 /// Largest prior variance of a force in units of the noise variance: uninformative, and small enough that double precision
 /// still resolves the noise.
 pub(crate) const MAX_VARIANCE_RATIO: f64 = 1e8;
 /// Largest error that rounding leaves in a pivot of a correlation matrix.
 const PIVOT_ROUNDING: f64 = 1e-6;
+/// Share of a variance that an update leaves, below which rounding may have made the covariance indefinite: its errors, 1e-16 of the
+/// variances before, are then more than 1e-10 of those after, and of correlations close to one much more.
+const LOST_SHARE: f64 = 1e-6;
 /// Smallest variance kept, in units of the noise variance and the unknown's unit squared.
 const MIN_VARIANCE: f64 = 1e-15;
 

@@ -15,10 +15,11 @@
 //! become `K', b'`: a linear map of the state. Samples after the rupture therefore still inform the split of the ruptured
 //! layer into stiffness and friction, and samples before it inform `D`: the joint least-squares solution without a buffer.
 
-use super::air_history::BaselineFit;
+use super::baseline_fit::BaselineFit;
 use super::force_predictor::MEMORY_M;
-use super::gaussian::{Gaussian, Innovation, MAX_VARIANCE_RATIO, at_least, at_most};
+use super::gaussian::{Gaussian, Innovation, MAX_VARIANCE_RATIO};
 use super::noise_estimator::NoiseEstimator;
+use crate::bounds::{at_least, at_most};
 use crate::sample::MAX_LAYERS;
 
 pub(crate) const D: usize = 0;
@@ -30,6 +31,8 @@ pub(super) const BIAS: usize = 5;
 pub(super) const DRIFT: usize = 6;
 pub(super) const LINE: usize = 7;
 const N: usize = 8;
+/// Standard deviations (99.9 %) from the onset of the load beyond which a loading line does not begin there.
+const ONSET_SDS: f64 = 3.29;
 /// Unknowns in use where the baseline is constant.
 const WITHOUT_BASELINE: usize = 6;
 /// Innovation of the estimator.
@@ -51,16 +54,18 @@ pub(crate) struct LayerEstimator {
     pub(super) layer_confirmed: bool,
     /// Place of the last rupture in m and its standard deviation.
     pub(super) rupture_m: f64,
-    rupture_sd_m: f64,
+    pub(super) rupture_sd_m: f64,
     /// Travel of the gap behind the previous layer, over which its friction kept growing, and its standard deviation.
     pub(super) gap_m: f64,
-    gap_sd_m: f64,
+    pub(super) gap_sd_m: f64,
     /// Standard deviation of the start of the active layer and of the previous one, in m.
-    start_sd_m: f64,
+    pub(super) start_sd_m: f64,
     pub(super) previous_start_sd_m: f64,
     /// Prior scale of the active layer's slope in N/m.
     slope_scale: f64,
     contact_drive: f64,
+    /// Position of the contact in m and its standard deviation, where the force in air tells.
+    onset_m: Option<(f64, f64)>,
     /// Depth, drive, force and time since contact of the previous sample.
     last: Option<[f64; 4]>,
     /// The baseline moves: drift and line are unknowns.
@@ -116,6 +121,7 @@ impl LayerEstimator {
             previous_start_sd_m: 0.0,
             slope_scale: slope,
             contact_drive: drive,
+            onset_m: None,
             last: None,
             moving_baseline: false,
             contact_m: start_m,
@@ -298,7 +304,7 @@ impl LayerEstimator {
             let [p, k, b, q, ..] = self.belief.x;
             let (force, slope) = (p + q * self.contact_drive, k + b * self.contact_drive);
             if force > 0.0 && slope > 0.0 {
-                depth_at_contact = (force / slope).min(d);
+                depth_at_contact = self.depth_at_contact(force / slope).min(d);
                 let g = &self.belief.p;
                 let u0 = self.contact_drive;
                 let variance = (g[D][D] + 2.0 * u0 * g[K_PREV][D] + u0 * u0 * g[K_PREV][K_PREV]).max(1e-6);
@@ -345,6 +351,22 @@ impl LayerEstimator {
         self.last = None;
         self.initial_log_densities =
             [self.log_density_of_free(true, noise), self.log_density_of_free(false, noise)];
+    }
+
+    /// Sets the position of the contact that follows from the force in air, with its standard deviation.
+    pub(super) fn set_onset(&mut self, onset_m: (f64, f64)) {
+        self.onset_m = Some(onset_m);
+    }
+
+    /// Depth in m at which the contact was detected: where the loading line of the whole layer meets the baseline, which is accurate if the
+    /// base law holds, or the onset of the load where that is incompatible. In tissue that relaxes the loading curve is not straight.
+    fn depth_at_contact(&self, along_line_m: f64) -> f64 {
+        match self.onset_m {
+            Some((onset_m, sd_m)) if (self.start_m - along_line_m - onset_m).abs() > ONSET_SDS * sd_m => {
+                at_least(0.0, self.start_m - onset_m)
+            }
+            _ => along_line_m,
+        }
     }
 
     /// Reverts the free-tip assumption after a drop: moves half of the slope, with that sd, from friction to stiffness.
@@ -425,78 +447,6 @@ impl LayerEstimator {
         }
         self.start_m = position_m;
         self.last = None;
-    }
-
-    /// Shaft friction per drive that does not act at the tip, with the tip at `position_m`, and its variance (N s/m and its
-    /// square for a viscous drive).
-    #[inline(always)]
-    pub(crate) fn shaft_friction(&self, position_m: f64, noise: &NoiseEstimator) -> (f64, f64) {
-        if self.passed_count == 0 {
-            return (0.0, 0.0);
-        }
-        let g = &self.belief;
-        let (mut friction, mut variance) = (g.x[D], g.p[D][D]);
-        if self.tip_free {
-            let x = at_least(0.0, position_m - self.start_m);
-            friction += g.x[B] * x;
-            variance += x * (2.0 * g.cov(B, D) + x * g.p[B][B]);
-        } else if self.start_sd_m > 0.0 {
-            // A layer that begins `e` later than estimated changes the bias to `f0 - K e` and the friction to `D - b e`.
-            let (k, sd_k) = (g.x[K], libm::sqrt(g.p[K][K] * noise.variance));
-            if k > 2.0 * sd_k {
-                let later_m = (noise.bias_n() - g.x[BIAS]) / k;
-                let bound_m = 2.0 * self.start_sd_m;
-                let per_bias = g.x[B] / k;
-                friction += g.x[B] * at_least(-bound_m, at_most(bound_m, later_m));
-                variance += per_bias * (per_bias * g.p[BIAS][BIAS] - 2.0 * g.cov(BIAS, D));
-            }
-        }
-        (friction, variance * noise.variance)
-    }
-
-    /// Friction per drive of the passed layers at the last rupture, and its variance.
-    pub(crate) fn friction_at_rupture(&self, noise: &NoiseEstimator) -> (f64, f64) {
-        let (g, gap) = (&self.belief, self.gap_m);
-        let place = g.x[B_PREV] * self.gap_sd_m;
-        // Friction of the active layer over its uncertain start is not separable from `D`.
-        let start = g.x[B] * self.rupture_sd_m;
-        let estimated = g.p[D][D] - gap * (2.0 * g.cov(B_PREV, D) - gap * g.p[B_PREV][B_PREV]);
-        let variance = estimated + (place * place + start * start) / noise.variance;
-        (g.x[D] - gap * g.x[B_PREV], variance * noise.variance)
-    }
-
-    /// Growth of friction with travel while the shaft enters the previous layer, in N/m.
-    pub(crate) fn friction_growth(&self, drive: f64) -> f64 {
-        (self.belief.x[B_PREV] * drive).abs()
-    }
-
-    /// Variances of `K'` and `b'`.
-    pub(crate) fn previous_variance(&self, noise: &NoiseEstimator) -> [f64; 2] {
-        [self.belief.p[K_PREV][K_PREV] * noise.variance, self.belief.p[B_PREV][B_PREV] * noise.variance]
-    }
-
-    /// Friction per drive during retraction with the tip at `z_m`, each passed layer's friction spread evenly over its
-    /// thickness.
-    pub(crate) fn friction_during_retraction(
-        &self,
-        passed_layers: &PassedLayers,
-        z_m: f64,
-        deepest_m: f64,
-        noise: &NoiseEstimator,
-    ) -> f64 {
-        let count = self.passed_count.min(MAX_LAYERS);
-        let (mut whole, mut inside) = (0.0, 0.0);
-        for (i, [start, end, b]) in passed_layers.iter().take(count).enumerate() {
-            let b = if i + 1 == self.passed_count { self.belief.x[B_PREV].max(0.0) } else { *b };
-            // A rupture may be located just before the estimated start of its layer.
-            let length_m = at_least(0.0, end - start);
-            whole += b * length_m;
-            inside += b * at_least(0.0, at_most(length_m, z_m - start));
-        }
-        // The sum is known better than its parts.
-        let total = self.shaft_friction(deepest_m, noise).0.max(0.0);
-        let share = if whole > 0.0 { inside / whole } else { 1.0 };
-        total * share
     }
 
     /// Log density of the state, up to a constant, at `K = 0` and `b = b'` (`follows`) or `b = 0`.

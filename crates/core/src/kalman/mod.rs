@@ -5,12 +5,14 @@ mod air_decisions;
 mod air_history;
 mod air_sums;
 mod baseline;
+mod baseline_fit;
 mod contact_detection;
 mod cusum;
 mod force_predictor;
 mod free_tip;
 mod gaussian;
 mod layer_estimator;
+mod layer_friction;
 mod motion;
 mod noise_estimator;
 mod output;
@@ -28,14 +30,13 @@ mod test_support;
 #[cfg(test)]
 mod tests;
 
-use crate::config::EnhanceConfig;
+use crate::config::{EnhanceConfig, MAX_SPEED_MPS};
 use crate::sample::{Output, Sample, UnusedReason};
 pub(crate) use state::KalmanEnhancer;
 
 /// Multiplications and additions per sample outside the filters.
 const OPERATIONS_PER_SAMPLE: u32 = 60;
-/// Speeds in m/s and positions in m beyond these are logging errors.
-const MAX_SPEED_MPS: f64 = 2.0;
+/// Positions in m beyond this are logging errors.
 const MAX_POSITION_M: f64 = 10.0;
 /// Samples closer than this fraction of the usual interval, within these limits in s, are duplicates.
 const DUPLICATE_INTERVAL_FRACTION: f64 = 0.02;

@@ -1,10 +1,10 @@
 //! Motion between samples, and the drive of shaft friction.
 
 use super::force_predictor::MotionStep;
-use super::gaussian::at_least;
 use super::shaft_friction::FORCE_TIME_CONSTANT_S;
 use super::state::KalmanEnhancer;
 use super::velocity_estimator::{DISAGREEMENT_MEMORY_S, REST_SPEED_MPS};
+use crate::bounds::at_least;
 use crate::config::{EnhanceConfig, FrictionLaw};
 use crate::sample::Sample;
 

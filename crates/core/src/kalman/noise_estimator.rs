@@ -1,7 +1,7 @@
 //! Sensor noise as a first-order autoregression, `n_k = rho n_(k-1) + w_k` with white `w` of standard deviation `sigma`:
 //! estimated in air, tracked in the tissue.
 
-use super::gaussian::{at_least, at_most};
+use crate::bounds::{at_least, at_most};
 
 /// Longest memory in tissue, in samples: `sigma` to within 3 %, and so the false-alarm rate to within a factor of two.
 const MEMORY_SAMPLES: f64 = 2000.0;
@@ -9,6 +9,9 @@ const MEMORY_SAMPLES: f64 = 2000.0;
 pub(super) const MAX_RHO: f64 = 0.98;
 /// Clip of squared standardised innovations, so that single events do not bias the noise level.
 const MAX_SQUARED_INNOVATION: f64 = 16.0;
+/// Range of the smallest standard deviation in N: from below the resolution of any force sensor, so that the variance is positive, to a
+/// tenth of the largest force that is accepted.
+const SD_RANGE_N: [f64; 2] = [1e-9, 1e5];
 /// Samples in air before the first estimate.
 const MIN_AIR_SAMPLES: f64 = 40.0;
 /// Below this many samples innovations are not clipped.
@@ -39,8 +42,10 @@ pub(crate) struct NoiseEstimator {
 }
 
 impl NoiseEstimator {
-    /// The standard deviation is never estimated below `min_sd_n`.
+    /// The standard deviation is never estimated below `min_sd_n`, limited to [`SD_RANGE_N`].
     pub(crate) fn new(min_sd_n: f64) -> Self {
+        let [low, high] = SD_RANGE_N;
+        let min_sd_n = at_least(low, at_most(high, min_sd_n));
         Self {
             rho: 0.0,
             variance: min_sd_n * min_sd_n,

@@ -1,9 +1,9 @@
 //! Output of a sample: friction, enhanced force and its band, the estimate of the previous layer.
 
-use super::gaussian::at_least;
 use super::layer_estimator::{B, B_PREV, K, K_PREV};
 use super::retraction_tracker::ShaftSample;
 use super::state::KalmanEnhancer;
+use crate::bounds::{at_least, at_most};
 use crate::config::{EnhanceConfig, FrictionLaw};
 use crate::sample::{LayerEstimate, Output, Sample, State};
 
@@ -35,7 +35,7 @@ impl KalmanEnhancer {
             stiffness_n_per_m: k,
             friction: b,
             drop_n: drop,
-            elastic_share: (k / (k + b * self.steady_drive_mps)).clamp(0.0, 1.0),
+            elastic_share: at_least(0.0, at_most(1.0, k / (k + b * self.steady_drive_mps))),
             added_friction_ns_per_m: b * (d + l.gap_m),
             time_s: sample.time_s,
             stiffness_sd: libm::sqrt(vk.max(0.0)),

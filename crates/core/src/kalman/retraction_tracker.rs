@@ -3,7 +3,7 @@
 //! it.
 
 use super::force_predictor::MEMORY_M;
-use super::gaussian::{at_least, at_most};
+use crate::bounds::{at_least, at_most};
 
 /// Travel over which a difference becomes friction, in m: a tip force decays as `exp(-x/2 mm)`.
 pub(super) const TRACKING_TRAVEL_M: f64 = 2e-3;
@@ -72,7 +72,7 @@ impl RetractionTracker {
         self.offset_n += self.slope * travel;
         let mut residual = sample.force_n - predicted_n - self.offset_n;
         if sample.released && residual > 0.0 {
-            let released = (residual - self.last_residual_n).clamp(0.0, residual);
+            let released = at_most(residual, at_least(0.0, residual - self.last_residual_n));
             self.offset_n += released;
             residual -= released;
         }
@@ -120,7 +120,7 @@ impl ModelFriction {
             before_n = model_n;
         }
         let Some((_, tracker)) = &mut self.retraction else {
-            let friction = model_n.clamp(0.0, sample.force_n.max(0.0));
+            let friction = at_least(0.0, at_most(sample.force_n, model_n));
             return (friction, 0.25 * friction);
         };
         if !sample.track_retraction {

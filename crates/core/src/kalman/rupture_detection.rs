@@ -1,9 +1,9 @@
 //! Rupture detection: tracks force drops, tests them against noise and texture, and updates all filters at a rupture.
 
 use super::force_predictor::{MEMORY_M, MotionStep};
-use super::gaussian::{at_least, at_most};
 use super::motion::SPEED_TIME_CONSTANT_S;
 use super::state::{DropCandidate, KalmanEnhancer, MAX_DROP_DURATION_S, OPERATIONS_PER_RUPTURE};
+use crate::bounds::{at_least, at_most};
 use crate::config::EnhanceConfig;
 use crate::sample::{Cause, Detection, Sample};
 
@@ -54,7 +54,7 @@ impl KalmanEnhancer {
         } else {
             MAX_AVERAGED_SAMPLES
         };
-        let max_count = max_count.clamp(1.0, MAX_AVERAGED_SAMPLES);
+        let max_count = at_least(1.0, at_most(MAX_AVERAGED_SAMPLES, max_count));
         let gain = 1.0 / candidate.count.min(max_count);
         candidate.mean_n += gain * (sample.force_n - candidate.mean_n);
         let missing_n = self.snapshot.predict(sample.position_m, self.friction_drive_mps) - sample.force_n;

@@ -13,10 +13,10 @@
 //!   [`PRESLIDING_TRAVEL_M`] are prior means, which the tracker corrects.
 
 use super::force_predictor::MEMORY_M;
-use super::gaussian::{at_least, at_most};
 use super::retraction_tracker::{
     ModelFriction, PRESLIDING_TRAVEL_M, RetractionTracker, ShaftSample, TRACKING_TRAVEL_M,
 };
+use crate::bounds::{at_least, at_most};
 
 /// Friction pull during retraction as a fraction of the largest force: a puncture leaves half of the force as friction, and
 /// the pull is half of the push (asymmetric friction, Okamura 2004).

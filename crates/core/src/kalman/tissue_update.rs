@@ -1,13 +1,13 @@
 //! Processing of a sample in tissue: prediction, spike and rupture tests, updates of predictor, layer estimator and noise.
 
 use super::force_predictor::{self, ForcePredictor, MotionStep};
-use super::gaussian::{at_least, at_most};
 use super::layer_estimator::{LayerEstimator, LayerInnovation};
 use super::noise_estimator::NoiseEstimator;
 use super::state::{
     FAILED_MISFIT, KalmanEnhancer, MAX_ALARM_MISFIT, MAX_DROP_DURATION_S, MAX_STIFFNESS_N_PER_M,
     OPERATIONS_PER_RUPTURE,
 };
+use crate::bounds::{at_least, at_most};
 use crate::config::EnhanceConfig;
 use crate::sample::Sample;
 

@@ -10,7 +10,7 @@
 //! `6.5 sigma²/dt²`. Where that is as accurate as a good log and the log has been found to be smoothed, positions alone are used from
 //! then on; a velocity jump is a second difference that is significant.
 
-use super::gaussian::{at_least, at_most};
+use crate::bounds::{at_least, at_most};
 use crate::sample::Sample;
 
 /// Squared difference in variances from which log and positions disagree.

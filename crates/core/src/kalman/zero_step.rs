@@ -4,10 +4,10 @@
 //! another zero. If the rival predicts the force better, the rupture is withdrawn.
 
 use super::air_history::MIN_JUMP_SHARE;
-use super::gaussian::{at_least, at_most};
 use super::layer_estimator::{BIAS, LayerEstimator};
 use super::state::{KalmanEnhancer, MAX_ALARM_MISFIT, OPERATIONS_PER_RUPTURE};
 use super::zero_step_state::{Jump, Rival};
+use crate::bounds::{at_least, at_most};
 use crate::sample::{Sample, ZeroStep};
 
 /// Number of samples over which a jump must last and be level.

@@ -3,6 +3,7 @@
 
 use super::line_fit::LineFit;
 use super::low_pass::LowPassCoefficients;
+use crate::bounds::{at_least, at_most};
 use crate::config::ContactConfig;
 use crate::sample::Sample;
 
@@ -137,7 +138,9 @@ impl ContactDetector {
             return declared_m;
         }
         match self.line.x_at(self.mean_n) {
-            Some(at) if self.line.slope() > 0.0 => at.clamp(declared_m - MAX_EXTRAPOLATION_M, declared_m),
+            Some(at) if self.line.slope() > 0.0 => {
+                at_most(declared_m, at_least(declared_m - MAX_EXTRAPOLATION_M, at))
+            }
             _ => declared_m,
         }
     }

@@ -2,6 +2,7 @@
 
 use super::line_fit::LineFit;
 use super::sample_ring::{SampleRing, Storage};
+use crate::bounds::{at_least, at_most};
 use crate::config::{DropConfig, DropEstimator};
 use crate::sample::Sample;
 
@@ -71,7 +72,7 @@ impl ForceDrop {
         // Samples in the travel of the line at the present speed, thinned out to the permitted number.
         let step_m = edge.velocity_mps.abs() * (edge.time_s - before_edge.time_s);
         let wanted = if step_m > 0.0 { LINE_TRAVEL_M / step_m } else { 0.0 };
-        let stride = ((wanted / MAX_LOOK_BACK as f64) as u64 + 1).min(1 << 20);
+        let stride = ((wanted / MAX_LOOK_BACK as f64) as u64).saturating_add(1).min(1 << 20);
         let mut index = after;
         for _ in 0..MAX_LOOK_BACK {
             index = index.saturating_sub(if index == after { 1 } else { stride });
@@ -106,23 +107,24 @@ impl ForceDrop {
     /// The drop in N and the elastic share `kappa` of the force at the rupture, given the cumulative friction of the previous
     /// layers.
     pub(crate) fn drop_and_elastic_share(&self, config: &DropConfig, cumulative_ns_per_m: f64) -> (f64, f64) {
-        let (top_n, bottom_n) = match config.estimator {
-            DropEstimator::Lines => (
-                self.before.y_at(self.rupture_m).unwrap_or(0.0),
-                self.after.y_at(self.rupture_m).unwrap_or(0.0),
-            ),
-            DropEstimator::Extremes => (self.max_before_n, self.min_after_n),
+        let [low, high] = config.share_limits;
+        let sides = match config.estimator {
+            DropEstimator::Lines => self.before.y_at(self.rupture_m).zip(self.after.y_at(self.rupture_m)),
+            DropEstimator::Extremes => Some((self.max_before_n, self.min_after_n)),
+        };
+        let Some((top_n, bottom_n)) = sides.filter(|(top, bottom)| (top - bottom).is_finite()) else {
+            // No samples are kept on one side.
+            return (0.0, low);
         };
         let drop_n = top_n - bottom_n;
         let layer_n = top_n - cumulative_ns_per_m * self.velocity_mps;
-        let [low, high] = config.share_limits;
         let share = drop_n / layer_n;
         let share = if drop_n <= 0.0 || share.is_nan() {
             low
         } else if layer_n <= 0.0 {
             high
         } else {
-            share.clamp(low, high)
+            at_least(low, at_most(high, share))
         };
         (drop_n, share)
     }

@@ -1,5 +1,6 @@
 //! Friction of traversed layers, subtracted from the measured force.
 
+use crate::bounds::{at_least, at_most};
 use crate::sample::{LayerEstimate, MAX_LAYERS};
 
 /// Estimates of the traversed layers and their cumulative friction `D`.
@@ -55,7 +56,7 @@ impl FrictionCompensation {
             .iter()
             .map(|layer| {
                 if layer.thickness_m > 0.0 {
-                    let inside = (z_m - layer.start_m).clamp(0.0, layer.thickness_m);
+                    let inside = at_least(0.0, at_most(layer.thickness_m, z_m - layer.start_m));
                     layer.added_friction_ns_per_m * inside / layer.thickness_m
                 } else {
                     0.0

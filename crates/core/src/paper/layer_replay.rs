@@ -112,7 +112,7 @@ impl LayerReplay {
         online: [f64; 2],
     ) -> Option<[f64; 2]> {
         self.next = self.next.max(ring.oldest_index());
-        let stop = self.end.min(self.next + config.drop.replay_per_tick.max(1) as u64);
+        let stop = self.end.min(self.next.saturating_add(config.drop.replay_per_tick.max(1) as u64));
         while self.next < stop {
             let batch = ring.contiguous(self.next, stop);
             if batch.is_empty() {

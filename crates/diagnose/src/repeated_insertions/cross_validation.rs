@@ -33,7 +33,7 @@ pub fn score_prediction(run: &SegmentedRecording, p: &PredictedForce) -> Predict
     let mut out = PredictionScore::default();
     let first = run.ruptures_s.iter().copied().fold(NO_RUPTURE, f64::min);
     let (mut sum, mut inside) = (0.0, 0.0);
-    let limit_n = run.limit_n.unwrap_or(f64::INFINITY);
+    let limit_n = run.limit_n.map_or(f64::INFINITY, f64::abs);
     let clamped = |f: f64| f.clamp(-limit_n, limit_n);
     for i in 0..r.len().min(p.mean_n.len()) {
         let e = r.force_n[i] - clamped(p.mean_n[i]);

@@ -63,7 +63,7 @@ pub fn estimate_discrepancy(
     let left: Vec<([f64; 5], &[f64], Vec<f64>)> = others
         .iter()
         .map(|(o, predicted_n)| {
-            let limit_n = o.limit_n.unwrap_or(f64::INFINITY);
+            let limit_n = o.limit_n.map_or(f64::INFINITY, f64::abs);
             let residual = |(f, predicted): (&f64, &f64)| f - predicted.clamp(-limit_n, limit_n);
             let left = o.recording.force_n.iter().zip(predicted_n).map(residual).collect();
             (time_knots(o), o.recording.time_s.as_slice(), left)

@@ -76,7 +76,8 @@ impl Model {
                         let (low, high) = ((from / 10.0).max(p.low), (to * 10.0).min(p.high));
                         // The phase at the end of a recording limits the step of a frequency.
                         let step = if p.unit == "Hz" { 1e-6 / at[parameter].max(1e-3) } else { 1e-4 };
-                        (libm::log(low.max(1e-12)), libm::log(high), step)
+                        let low = if low > 0.0 { low } else { high.min(1e-12) };
+                        (libm::log(low), libm::log(high), step)
                     }
                     FitScale::Reciprocal => (0.0, 10.0 / from, 1e-4 / p.start),
                     FitScale::Linear => {

@@ -94,6 +94,24 @@ fn the_contact_time_is_that_of_the_first_sample_at_the_contact_position() {
 }
 
 #[test]
+fn after_a_restart_the_contact_time_is_of_the_last_pass() {
+    // Two insertions, a quarter of an hour apart; the second surface lies 2 mm deeper.
+    let one: Vec<f64> = (0..1600).map(|i| 0.005 * f64::from(i)).collect();
+    let time_s: Vec<f64> = one.iter().copied().chain(one.iter().map(|t| 900.0 + t)).collect();
+    let position_m: Vec<f64> = one.iter().chain(&one).map(|t| 0.0025 * t - 0.005).collect();
+    let surface_m = |t: f64| if t < 900.0 { 0.0 } else { 0.002 };
+    let force_n: Vec<f64> =
+        position_m.iter().zip(&time_s).map(|(z, t)| 100.0 * (z - surface_m(*t)).max(0.0)).collect();
+    let run =
+        Recording::with_velocity(time_s, position_m, vec![0.0025; 3200], force_n.clone()).expect("columns");
+    let trace = Trace::run(&run, &force_n, &EnhanceConfig::default(), 0.0, |_, _| {});
+    assert_eq!(trace.restarts, 1);
+    let (z, t) = (trace.contact_m.expect("contact"), trace.contact_s.expect("contact"));
+    assert!((z - 0.002).abs() < 1e-3, "{z}");
+    assert!((-1e-9..0.0051).contains(&(t - 900.0 - (z + 0.005) / 0.0025)), "{z} at {t}");
+}
+
+#[test]
 fn twenty_one_minutes_at_the_sensor_rate_are_stored() {
     let minutes = [MAX_STORED_SAMPLES].map(|n| n / (200 * 60));
     assert_eq!(minutes, [21]);

@@ -159,7 +159,7 @@ impl Effect for ViscoelasticPresliding {
             state[3] = keep;
             state[4] = ramp;
         }
-        w = (w * keep + limit / self.delta_m * tip.dz_m * ramp).clamp(-limit, limit);
+        w = (w * keep + limit / self.delta_m * tip.dz_m * ramp).max(-limit).min(limit);
         state[0] = w;
         w
     }

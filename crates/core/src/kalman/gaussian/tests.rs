@@ -131,9 +131,21 @@ fn an_impossible_covariance_is_not_positive_definite() {
 }
 
 #[test]
-fn bounds_replace_nan() {
-    assert_eq!([at_least(1.0, 2.0), at_least(1.0, 0.5), at_least(1.0, f64::NAN)], [2.0, 1.0, 1.0]);
-    assert_eq!([at_most(1.0, 2.0), at_most(1.0, 0.5), at_most(1.0, f64::NAN)], [1.0, 0.5, 1.0]);
+fn an_update_beyond_double_precision_leaves_a_definite_covariance() {
+    // Rounding leaves 1e-15 of 1e14, with correlations of the size before.
+    let (wide, column) = (1e14, 0.98e14);
+    let mut g = Gaussian::<3>::new([0.0; 3], [wide, wide, 1.0]);
+    g.p[1][0] = column;
+    for h in [[1.0, 0.0, 0.0], [1.0 / 3.0, 1.0, 1e-9], [7.3, 0.1, 1.0]] {
+        let innovation = g.innovation([0, 1, 2], h, 1.0, 1e-3);
+        g.update(&innovation);
+        assert!(g.is_positive_definite(), "{:?}", g.p);
+    }
+    // Cancellation in a time update.
+    let mut g = Gaussian::<2>::new([0.0; 2], [1.0, 1e18]);
+    g.p[1][0] = -1e9;
+    g.add_multiple(0, 1, 1e-9);
+    assert!(g.is_positive_definite(), "{:?}", g.p);
 }
 
 #[test]

@@ -1,4 +1,4 @@
-use super::super::air_history::BaselineFit;
+use super::super::baseline_fit::BaselineFit;
 use super::super::layer_estimator::{D, DRIFT, LINE};
 use super::super::shaft_friction::DryShaftFriction;
 use super::super::test_support::{advancing, inside, near, sample};

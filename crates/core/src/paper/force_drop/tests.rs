@@ -219,3 +219,18 @@ fn a_drop_at_the_first_sample_or_at_standstill_uses_the_available_samples() {
     assert_eq!(ForceDrop::begin(&history, 0, 2).before.count, 2.0);
     assert_eq!(ForceDrop::begin(&history, 1, 2).before.count, 1.0);
 }
+
+#[test]
+fn without_samples_on_one_side_no_drop_is_measured() {
+    // Storage for one sample: none before the rupture is kept.
+    let mut history = SampleRing::new(alloc::vec![Sample::default(); 1]);
+    for number in 0..4 {
+        let t = f64::from(number);
+        history.push(Sample { time_s: t, position_m: 0.001 * t, velocity_mps: 0.001, force_n: 2.0 - t });
+    }
+    let drop = ForceDrop::begin(&history, 0, 3);
+    for estimator in [DropEstimator::Lines, DropEstimator::Extremes] {
+        let config = DropConfig { estimator, ..DropConfig::default() };
+        assert_eq!(drop.drop_and_elastic_share(&config, 0.0), (0.0, config.share_limits[0]), "{estimator:?}");
+    }
+}

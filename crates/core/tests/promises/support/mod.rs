@@ -15,7 +15,7 @@ pub struct Insertion {
     pub ruptures: Vec<Rupture>,
 }
 
-/// Runs the law over a velocity profile, integrated at `sample_hz` from `start_m`.
+/// Runs the base law over a velocity profile, integrated at `sample_hz` from `start_m`.
 pub fn insertion(
     tissue: &Tissue,
     start_m: f64,
@@ -25,7 +25,19 @@ pub fn insertion(
     seed: u64,
     velocity_mps: impl Fn(f64) -> f64,
 ) -> Insertion {
-    let law = ForceLaw::base(tissue);
+    insertion_into(&ForceLaw::base(tissue), start_m, duration_s, sample_hz, noise_n, seed, velocity_mps)
+}
+
+/// As [`insertion`] for any law.
+pub fn insertion_into(
+    law: &ForceLaw,
+    start_m: f64,
+    duration_s: f64,
+    sample_hz: f64,
+    noise_n: f64,
+    seed: u64,
+    velocity_mps: impl Fn(f64) -> f64,
+) -> Insertion {
     let mut state = ForceLawState::default();
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut out = Insertion { samples: Vec::new(), truth: Vec::new(), ruptures: Vec::new() };

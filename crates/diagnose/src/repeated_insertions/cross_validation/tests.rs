@@ -79,6 +79,9 @@ fn predictions_are_clamped_at_the_saturation_limit() {
     let p = PredictedForce { mean_n: mean, low_n: low, high_n: high };
     let s = score_prediction(&r, &p);
     assert!(s.rmse_n < 1e-12 && s.coverage == 1.0, "{s:?}");
+    // Corrected by a bias larger than itself.
+    r.limit_n = Some(-1.5);
+    assert_eq!(score_prediction(&r, &p), s);
     r.limit_n = None;
     assert!(score_prediction(&r, &p).rmse_n > 0.1 && score_prediction(&r, &p).coverage < 0.9);
 }
