@@ -54,6 +54,26 @@ impl Observation<'_> {
     }
 }
 
+/// Derivatives of the force in every block by the deviation in units of `sd`, at the deviation `v` in these units; zero where `sd` is.
+pub fn slopes(
+    force: &impl Fn(&Values) -> Option<Vec<f64>>,
+    v: &Values,
+    sd: &Values,
+    blocks: usize,
+) -> Vec<Vec<f64>> {
+    (0..PARAMETERS)
+        .map(|j| {
+            let moved =
+                |by: f64| force(&std::array::from_fn(|k| sd[k] * (v[k] + if k == j { by } else { 0.0 })));
+            let both = (sd[j] > 0.0).then(|| moved(-DERIVATIVE_STEP).zip(moved(DERIVATIVE_STEP)));
+            both.flatten().map_or_else(
+                || vec![0.0; blocks],
+                |(a, b)| a.iter().zip(&b).map(|(a, b)| (b - a) / (2.0 * DERIVATIVE_STEP)).collect(),
+            )
+        })
+        .collect()
+}
+
 /// Fits the deviation of one recording; `force` predicts its blocks (N) for a deviation.
 pub fn estimate_recording(
     observed: &Observation,
@@ -77,20 +97,7 @@ pub fn estimate_recording(
     }
     let mut information = SymmetricMatrix::zeros(PARAMETERS);
     for _ in 0..MAX_ITERATIONS {
-        let slopes: Vec<Vec<f64>> = (0..PARAMETERS)
-            .map(|j| {
-                let moved = |by: f64| {
-                    let mut moved = v;
-                    moved[j] += by;
-                    force(&scaled(&moved))
-                };
-                let both = (prior_sd[j] > 0.0).then(|| moved(-DERIVATIVE_STEP).zip(moved(DERIVATIVE_STEP)));
-                both.flatten().map_or_else(
-                    || vec![0.0; predicted.len()],
-                    |(a, b)| a.iter().zip(&b).map(|(a, b)| (b - a) / (2.0 * DERIVATIVE_STEP)).collect(),
-                )
-            })
-            .collect();
+        let slopes = slopes(&force, &v, &prior_sd, predicted.len());
         information = SymmetricMatrix::zeros(PARAMETERS);
         let mut gradient = v.map(|v| -v);
         for (k, e) in observed.residuals(&predicted) {
@@ -114,13 +121,19 @@ pub fn estimate_recording(
             break;
         }
     }
-    let mut unscaled = SymmetricMatrix::zeros(PARAMETERS);
-    for i in 0..PARAMETERS {
-        for j in (0..=i).filter(|j| prior_sd[i] > 0.0 && prior_sd[*j] > 0.0) {
-            unscaled.add(i, j, information.at(i, j) / (prior_sd[i] * prior_sd[j]));
-        }
+    let per_sd = prior_sd.map(|sd| if sd > 0.0 { 1.0 / sd } else { 0.0 });
+    Some(RecordingEstimate { deviation: scaled(&v), information: rescaled(&information, &per_sd), prior_sd })
+}
+
+impl RecordingEstimate {
+    /// Information matrix times the deviation that would fit the recording best without a prior.
+    fn weighted(&self) -> Values {
+        let pull = product(&self.information, &self.deviation);
+        std::array::from_fn(|k| {
+            let sd = self.prior_sd[k];
+            pull[k] + if sd > 0.0 { self.deviation[k] / (sd * sd) } else { 0.0 }
+        })
     }
-    Some(RecordingEstimate { deviation: scaled(&v), information: unscaled, prior_sd })
 }
 
 /// Cholesky factor of a matrix plus the identity.
@@ -131,7 +144,7 @@ fn with_identity(matrix: &SymmetricMatrix) -> CholeskyFactor {
 }
 
 /// `D A D` for a diagonal `D`.
-fn rescaled(matrix: &SymmetricMatrix, by: &Values) -> SymmetricMatrix {
+pub fn rescaled(matrix: &SymmetricMatrix, by: &Values) -> SymmetricMatrix {
     let mut out = SymmetricMatrix::zeros(PARAMETERS);
     for i in 0..PARAMETERS {
         (0..=i).for_each(|j| out.add(i, j, by[i] * matrix.at(i, j) * by[j]));
@@ -139,8 +152,60 @@ fn rescaled(matrix: &SymmetricMatrix, by: &Values) -> SymmetricMatrix {
     out
 }
 
-fn product(matrix: &SymmetricMatrix, by: &Values) -> Values {
+/// Product of a matrix and a vector.
+pub fn product(matrix: &SymmetricMatrix, by: &Values) -> Values {
     std::array::from_fn(|i| (0..PARAMETERS).map(|j| matrix.at(i, j) * by[j]).sum())
+}
+
+/// Information of a group's recordings on its deviation.
+#[derive(Clone, Debug)]
+pub struct GroupInformation {
+    /// Information matrix.
+    information: SymmetricMatrix,
+    /// Information matrix times the deviation that fits best.
+    weighted: Values,
+}
+
+impl GroupInformation {
+    /// Without a recording.
+    #[must_use]
+    pub fn none() -> Self {
+        Self { information: SymmetricMatrix::zeros(PARAMETERS), weighted: [0.0; PARAMETERS] }
+    }
+
+    /// Information of recordings that scatter by `recording_sd`.
+    #[must_use]
+    pub fn new(recordings: &[&RecordingEstimate], recording_sd: &Values) -> Self {
+        let mut out = Self::none();
+        recordings.iter().for_each(|r| out.add(&r.information, &r.weighted(), recording_sd));
+        out
+    }
+
+    /// Adds a recording with its information matrix, and that matrix times its best deviation.
+    pub fn add(&mut self, information: &SymmetricMatrix, weighted: &Values, recording_sd: &Values) {
+        // (A^-1 + R^2)^-1 = A - A R (1 + R A R)^-1 R A, without an inverse of A.
+        let inner = with_identity(&rescaled(information, recording_sd));
+        let reduced = |x: &Values| -> Values {
+            let scaled: Vec<f64> = x.iter().zip(recording_sd).map(|(x, sd)| x * sd).collect();
+            let solved = inner.solve(&scaled);
+            let back: Values = std::array::from_fn(|k| recording_sd[k] * solved[k]);
+            let less = product(information, &back);
+            std::array::from_fn(|k| x[k] - less[k])
+        };
+        for j in 0..PARAMETERS {
+            let column = reduced(&std::array::from_fn(|i| information.at(i, j)));
+            (j..PARAMETERS).for_each(|i| self.information.add(i, j, column[i]));
+        }
+        let of_group = reduced(weighted);
+        (0..PARAMETERS).for_each(|k| self.weighted[k] += of_group[k]);
+    }
+
+    /// The same multiplied by `share`.
+    #[must_use]
+    pub fn times(&self, share: f64) -> Self {
+        let root = [share.sqrt(); PARAMETERS];
+        Self { information: rescaled(&self.information, &root), weighted: self.weighted.map(|w| share * w) }
+    }
 }
 
 /// Distribution of a group's deviation.
@@ -152,6 +217,8 @@ pub struct GroupEstimate {
     pub full_mean: Values,
     /// Probability that each parameter deviates.
     pub probability: Values,
+    /// Probability that none deviates.
+    pub probability_of_none: f64,
     /// Standard deviations before the update.
     prior_sd: Values,
     /// Factor of the precision with all parameters, relative to the prior's.
@@ -167,9 +234,9 @@ struct Subset {
 }
 
 impl Subset {
-    fn new(information: &SymmetricMatrix, weighted: &Values, sd: &Values) -> Self {
-        let precision = with_identity(&rescaled(information, sd));
-        let scaled: Values = std::array::from_fn(|k| sd[k] * weighted[k]);
+    fn new(known: &GroupInformation, sd: &Values) -> Self {
+        let precision = with_identity(&rescaled(&known.information, sd));
+        let scaled: Values = std::array::from_fn(|k| sd[k] * known.weighted[k]);
         let solved = precision.solve(&scaled);
         let gain: f64 = scaled.iter().zip(&solved).map(|(a, b)| a * b).sum();
         Self {
@@ -184,56 +251,41 @@ impl GroupEstimate {
     /// Estimate from recordings of the group, which may be none.
     #[must_use]
     pub fn new(recordings: &[&RecordingEstimate], group_sd: Values, recording_sd: Values) -> Self {
-        let mut information = SymmetricMatrix::zeros(PARAMETERS);
-        let mut weighted = [0.0; PARAMETERS];
-        for r in recordings {
-            // (A^-1 + R^2)^-1 = A - A R (1 + R A R)^-1 R A, without an inverse of A.
-            let inner = with_identity(&rescaled(&r.information, &recording_sd));
-            let reduced = |x: &Values| -> Values {
-                let scaled: Vec<f64> = x.iter().zip(&recording_sd).map(|(x, sd)| x * sd).collect();
-                let solved = inner.solve(&scaled);
-                let back: Values = std::array::from_fn(|k| recording_sd[k] * solved[k]);
-                let less = product(&r.information, &back);
-                std::array::from_fn(|k| x[k] - less[k])
-            };
-            for j in 0..PARAMETERS {
-                let column = reduced(&std::array::from_fn(|i| r.information.at(i, j)));
-                (j..PARAMETERS).for_each(|i| information.add(i, j, column[i]));
-            }
-            let pull = product(&r.information, &r.deviation);
-            let normal: Values = std::array::from_fn(|k| {
-                let sd = r.prior_sd[k];
-                pull[k] + if sd > 0.0 { r.deviation[k] / (sd * sd) } else { 0.0 }
-            });
-            let of_group = reduced(&normal);
-            (0..PARAMETERS).for_each(|k| weighted[k] += of_group[k]);
-        }
+        Self::from_information(&GroupInformation::new(recordings, &recording_sd), group_sd)
+    }
+
+    /// Estimate from the information of the recordings.
+    #[must_use]
+    pub fn from_information(known: &GroupInformation, group_sd: Values) -> Self {
         let free: Vec<usize> = (0..PARAMETERS).filter(|k| group_sd[*k] > 0.0).collect();
         let subsets: Vec<(Values, Subset)> = (0..1_usize << free.len())
             .map(|mask| {
                 let is_in =
                     |k: usize| free.iter().position(|f| *f == k).is_some_and(|bit| mask >> bit & 1 == 1);
                 let sd = std::array::from_fn(|k| if is_in(k) { group_sd[k] } else { 0.0 });
-                (sd, Subset::new(&information, &weighted, &sd))
+                (sd, Subset::new(known, &sd))
             })
             .collect();
         let best = subsets.iter().map(|(_, s)| s.ln_evidence).fold(f64::NEG_INFINITY, f64::max);
         let others = (subsets.len() - 1).max(1) as f64;
         let (mut mean, mut probability, mut total) = ([0.0; PARAMETERS], [0.0; PARAMETERS], 0.0);
+        let mut none = 0.0;
         for (mask, (sd, subset)) in subsets.iter().enumerate() {
             let prior = if mask == 0 { others } else { 1.0 };
             let weight = prior * libm::exp(subset.ln_evidence - best);
             total += weight;
+            none += if mask == 0 { weight } else { 0.0 };
             for k in 0..PARAMETERS {
                 mean[k] += weight * subset.mean[k];
                 probability[k] += if sd[k] > 0.0 { weight } else { 0.0 };
             }
         }
-        let full = Subset::new(&information, &weighted, &group_sd);
+        let full = Subset::new(known, &group_sd);
         Self {
             mean: mean.map(|m| m / total),
             full_mean: full.mean,
             probability: probability.map(|p| p / total),
+            probability_of_none: none / total,
             prior_sd: group_sd,
             precision: full.precision,
         }
