@@ -68,6 +68,13 @@ impl<'a> GroupFit<'a> {
         GroupInformation::new(&kept.map(|(_, e)| e).collect::<Vec<_>>(), &self.recording_sd)
     }
 
+    /// RMS error (N) of the block means of all recordings, each with its own estimated deviation.
+    pub fn own_rms_n(&self) -> Option<f64> {
+        let own =
+            |r: usize| self.recordings.iter().position(|k| *k == r).map(|k| self.estimates[k].deviation);
+        self.rms_n(&self.recordings, |r| own(r).unwrap_or([0.0; PARAMETERS]))
+    }
+
     /// RMS error (N) of the block means of `recordings`, each with its deviation.
     pub fn rms_n(&self, recordings: &[usize], deviation: impl Fn(usize) -> Values + Sync) -> Option<f64> {
         let each: Vec<(f64, f64)> =

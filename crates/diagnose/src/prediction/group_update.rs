@@ -144,7 +144,7 @@ fn with_identity(matrix: &SymmetricMatrix) -> CholeskyFactor {
 }
 
 /// `D A D` for a diagonal `D`.
-pub fn rescaled(matrix: &SymmetricMatrix, by: &Values) -> SymmetricMatrix {
+fn rescaled(matrix: &SymmetricMatrix, by: &Values) -> SymmetricMatrix {
     let mut out = SymmetricMatrix::zeros(PARAMETERS);
     for i in 0..PARAMETERS {
         (0..=i).for_each(|j| out.add(i, j, by[i] * matrix.at(i, j) * by[j]));

@@ -22,7 +22,8 @@ use stylet_stats::parallel::*;
 
 /// Posterior probability of a difference from which a parameter is named: the median probability model (Barbieri and Berger 2004).
 pub const DIFFERENCE_PROBABILITY: f64 = 0.5;
-/// Ratio of the error of the updated model on the new group to its error on its own group above which the new group follows another law.
+/// Ratio of the misfit on the new group, with all parameters of every recording updated, to misfit and scatter on the model's own group above
+/// which the new group follows another law.
 pub const MAX_MISFIT_RATIO: f64 = 2.0;
 
 /// Result of a comparison of two groups.
@@ -88,7 +89,9 @@ pub struct Transfer {
     pub before_n: f64,
     /// The same after an update of all parameters.
     pub after_n: f64,
-    /// `after_n` over `model_n`.
+    /// RMS error (N) with all parameters of every recording updated: misfit without scatter.
+    pub own_n: f64,
+    /// `own_n` over `model_n`.
     pub misfit_ratio: f64,
     /// Whether the new group has a speed without recordings of the model.
     pub is_unseen_speed: bool,
@@ -174,7 +177,8 @@ pub fn compare_groups(
             })
         })
         .collect::<Result<_, DiagnoseError>>()?;
-    let misfit_ratio = after_n / model_n;
+    let own_n = fit.own_rms_n().ok_or(DiagnoseError::NoFit)?;
+    let misfit_ratio = own_n / model_n;
     let verdict = if misfit_ratio > MAX_MISFIT_RATIO {
         TransferVerdict::AnotherLaw
     } else if (0..PARAMETERS).any(differs) {
@@ -195,6 +199,7 @@ pub fn compare_groups(
         model_n,
         before_n,
         after_n,
+        own_n,
         misfit_ratio,
         is_unseen_speed: unseen,
     };

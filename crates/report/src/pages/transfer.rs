@@ -51,8 +51,9 @@ pub fn summary_sentence(t: &Transfer) -> String {
     let equal = named(false, &|p| name(p.parameter).to_owned());
     match t.verdict {
         TransferVerdict::AnotherLaw => format!(
-            "Another law: with all parameters updated the model misses the recordings by {} N rms, {} times its error on its own recordings.",
-            significant(t.after_n, 3),
+            "Another law: with all parameters of every recording updated the model is off by {} N rms, {} times its error on its own \
+             recordings.",
+            significant(t.own_n, 3),
             significant(t.misfit_ratio, 2)
         ),
         TransferVerdict::Ambiguous => format!(
@@ -122,6 +123,11 @@ fn overview(t: &Transfer) -> Section {
             "Updated model",
             format!("{} N", significant(t.after_n, 3)),
             "the same with all parameters updated".to_owned(),
+        ),
+        Tile::new(
+            "Misfit",
+            format!("{} N", significant(t.own_n, 3)),
+            "the same with all parameters of every recording updated: misfit without scatter".to_owned(),
         )
         .status(Status::at_most(t.misfit_ratio, MAX_MISFIT_RATIO, MAX_MISFIT_RATIO)),
         Tile::new(
