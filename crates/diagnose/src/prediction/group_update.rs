@@ -19,6 +19,8 @@ const DERIVATIVE_STEP: f64 = 0.25;
 const MAX_HALVINGS: usize = 6;
 /// Start values of the surface, in standard deviations of the prior.
 const SURFACE_STARTS: [f64; 9] = [0.0, -1.0, 1.0, -2.0, 2.0, -3.0, 3.0, -4.0, 4.0];
+/// Start values of the puncture force, in standard deviations of the prior: a rupture far from the measured one attracts no gradient.
+const PUNCTURE_STARTS: [f64; 5] = [0.0, -1.0, 1.0, -2.0, 2.0];
 
 /// Estimated deviation of one recording.
 #[derive(Clone, Debug)]
@@ -87,12 +89,15 @@ pub fn estimate_recording(
     };
     let mut v = [0.0; PARAMETERS];
     let (mut nats, mut predicted) = at(&v)?;
-    for start in SURFACE_STARTS.iter().filter(|_| prior_sd[0] > 0.0) {
-        let trial = [*start, 0.0, 0.0, 0.0];
-        if let Some((trial_nats, f)) = at(&trial)
-            && trial_nats < nats
-        {
-            (v, nats, predicted) = (trial, trial_nats, f);
+    let free = |starts: &'static [f64], k: usize| if prior_sd[k] > 0.0 { starts } else { &starts[..1] };
+    for surface in free(&SURFACE_STARTS, 0) {
+        for puncture in free(&PUNCTURE_STARTS, 3) {
+            let trial = [*surface, 0.0, 0.0, *puncture];
+            if let Some((trial_nats, f)) = at(&trial)
+                && trial_nats < nats
+            {
+                (v, nats, predicted) = (trial, trial_nats, f);
+            }
         }
     }
     let mut information = SymmetricMatrix::zeros(PARAMETERS);

@@ -198,7 +198,7 @@ fn force(
     let depth_mm: Vec<f64> = of(&after.position_m).iter().map(|z| 1e3 * z).collect();
     let line = |name: &str, colour, y: &[f64]| Series::line(name, colour, depth_mm.clone(), of(y));
     let mut chart = Chart::new(format!("{name}: {phase}"), "Position (mm)", "Force (N)")
-        .caption("Dashed: 90 % bands of the model for an unseen group (red) and of the updated model (blue).")
+        .caption("Dashed: 90 % bands, of the model for an unseen group and of the updated model.")
         .group(name.to_owned())
         .height(300)
         .with_series(line("measured", Colour::Grey, &after.measured_n).width(3.0));
@@ -207,8 +207,8 @@ fn force(
         ("updated model", Colour::Blue, Colour::SkyBlue, after),
     ] {
         chart = chart.with_series(line(which, colour, &curves.predicted_n).width(1.4));
-        for edge in [&curves.low_n, &curves.high_n] {
-            let series = line(&format!("band of the {which}"), edge_colour, edge);
+        for (share, edge) in [("5 %", &curves.low_n), ("95 %", &curves.high_n)] {
+            let series = line(&format!("{which}, {share}"), edge_colour, edge);
             chart = chart.with_series(series.width(0.8).styled(LineStyle::Dashed));
         }
     }
