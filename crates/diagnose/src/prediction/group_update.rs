@@ -76,58 +76,91 @@ pub fn slopes(
         .collect()
 }
 
-/// Fits the deviation of one recording; `force` predicts its blocks (N) for a deviation.
+/// Fits the deviation of one recording; `force` predicts its blocks (N) for a deviation. The best of the minima from several starts is kept.
 pub fn estimate_recording(
     observed: &Observation,
     force: impl Fn(&Values) -> Option<Vec<f64>>,
     prior_sd: Values,
 ) -> Option<RecordingEstimate> {
-    let scaled = |v: &Values| -> Values { std::array::from_fn(|j| v[j] * prior_sd[j]) };
-    let at = |v: &Values| -> Option<(f64, Vec<f64>)> {
-        let f = force(&scaled(v))?;
-        Some((observed.nats(&f) + 0.5 * v.iter().map(|v| v * v).sum::<f64>(), f))
-    };
-    let mut v = [0.0; PARAMETERS];
-    let (mut nats, mut predicted) = at(&v)?;
+    let fit = RecordingFit { observed, force, prior_sd };
     let free = |starts: &'static [f64], k: usize| if prior_sd[k] > 0.0 { starts } else { &starts[..1] };
-    for surface in free(&SURFACE_STARTS, 0) {
-        for puncture in free(&PUNCTURE_STARTS, 3) {
-            let trial = [*surface, 0.0, 0.0, *puncture];
-            if let Some((trial_nats, f)) = at(&trial)
-                && trial_nats < nats
-            {
-                (v, nats, predicted) = (trial, trial_nats, f);
-            }
+    let mut best: Option<(f64, RecordingEstimate)> = None;
+    for puncture in free(&PUNCTURE_STARTS, 3) {
+        let starts = free(&SURFACE_STARTS, 0).iter().map(|surface| [*surface, 0.0, 0.0, *puncture]);
+        let start = starts
+            .filter_map(|v| fit.at(v))
+            .reduce(|best, next| if next.nats < best.nats { next } else { best });
+        let Some((nats, found)) = start.map(|start| fit.minimum(start)) else { continue };
+        if best.as_ref().is_none_or(|(least, _)| nats < *least) {
+            best = Some((nats, found));
         }
     }
-    let mut information = SymmetricMatrix::zeros(PARAMETERS);
-    for _ in 0..MAX_ITERATIONS {
-        let slopes = slopes(&force, &v, &prior_sd, predicted.len());
-        information = SymmetricMatrix::zeros(PARAMETERS);
-        let mut gradient = v.map(|v| -v);
-        for (k, e) in observed.residuals(&predicted) {
-            for i in 0..PARAMETERS {
-                gradient[i] += observed.weight * slopes[i][k] * e;
-                (0..=i).for_each(|j| information.add(i, j, observed.weight * slopes[i][k] * slopes[j][k]));
+    best.map(|(_, estimate)| estimate)
+}
+
+/// A recording with its prior.
+struct RecordingFit<'a, F> {
+    observed: &'a Observation<'a>,
+    force: F,
+    prior_sd: Values,
+}
+
+/// A trial deviation.
+struct Trial {
+    /// Deviation in standard deviations of the prior.
+    v: Values,
+    /// Negative log posterior.
+    nats: f64,
+    /// Predicted force in N.
+    predicted: Vec<f64>,
+}
+
+impl<F: Fn(&Values) -> Option<Vec<f64>>> RecordingFit<'_, F> {
+    fn scaled(&self, v: &Values) -> Values {
+        std::array::from_fn(|j| v[j] * self.prior_sd[j])
+    }
+
+    fn at(&self, v: Values) -> Option<Trial> {
+        let predicted = (self.force)(&self.scaled(&v))?;
+        let nats = self.observed.nats(&predicted) + 0.5 * v.iter().map(|v| v * v).sum::<f64>();
+        Some(Trial { v, nats, predicted })
+    }
+
+    /// Local minimum (Gauss-Newton) and its negative log posterior.
+    fn minimum(&self, start: Trial) -> (f64, RecordingEstimate) {
+        let mut here = start;
+        let mut information = SymmetricMatrix::zeros(PARAMETERS);
+        let weight = self.observed.weight;
+        for _ in 0..MAX_ITERATIONS {
+            let slopes = slopes(&self.force, &here.v, &self.prior_sd, here.predicted.len());
+            information = SymmetricMatrix::zeros(PARAMETERS);
+            let mut gradient = here.v.map(|v| -v);
+            for (k, e) in self.observed.residuals(&here.predicted) {
+                for i in 0..PARAMETERS {
+                    gradient[i] += weight * slopes[i][k] * e;
+                    (0..=i).for_each(|j| information.add(i, j, weight * slopes[i][k] * slopes[j][k]));
+                }
+            }
+            let step = with_identity(&information).solve(&gradient);
+            let shares = (0..=MAX_HALVINGS).map(|k| libm::exp2(-(k as f64)));
+            let better = shares
+                .filter_map(|share| self.at(std::array::from_fn(|j| here.v[j] + share * step[j])))
+                .find(|trial| trial.nats < here.nats);
+            let Some(next) = better else { break };
+            let gain = here.nats - next.nats;
+            here = next;
+            if gain < MIN_GAIN_NATS {
+                break;
             }
         }
-        let step = with_identity(&information).solve(&gradient);
-        let trials = (0..=MAX_HALVINGS).map(|k| libm::exp2(-(k as f64)));
-        let better = trials
-            .filter_map(|share| {
-                let trial: Values = std::array::from_fn(|j| v[j] + share * step[j]);
-                at(&trial).map(|(n, f)| (n, trial, f))
-            })
-            .find(|(n, ..)| *n < nats);
-        let Some((next, trial, f)) = better else { break };
-        let gain = nats - next;
-        (v, nats, predicted) = (trial, next, f);
-        if gain < MIN_GAIN_NATS {
-            break;
-        }
+        let per_sd = self.prior_sd.map(|sd| if sd > 0.0 { 1.0 / sd } else { 0.0 });
+        let found = RecordingEstimate {
+            deviation: self.scaled(&here.v),
+            information: rescaled(&information, &per_sd),
+            prior_sd: self.prior_sd,
+        };
+        (here.nats, found)
     }
-    let per_sd = prior_sd.map(|sd| if sd > 0.0 { 1.0 / sd } else { 0.0 });
-    Some(RecordingEstimate { deviation: scaled(&v), information: rescaled(&information, &per_sd), prior_sd })
 }
 
 impl RecordingEstimate {
