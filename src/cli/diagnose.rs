@@ -13,7 +13,6 @@ use stylet_api::{DiagnoseOptions, resource_estimate};
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     if let Some(model) = &args.transfer {
-        recover_parent(model)?;
         return crate::cli::transfer::diagnose(args, model);
     }
     let Some(file) = &args.scenario else {

@@ -5,13 +5,16 @@ use crate::cli::exit_codes::Failure;
 use crate::cli::output_args::default_folder;
 use crate::cli::predict::varying_factors;
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use stylet_api::output_folder::{check_folder, check_own_file};
 use stylet_api::transfer::{DiagnosedModel, GroupFiles, model_file};
 use stylet_api::{Factor, resource_estimate};
 use stylet_diagnose::prediction::{Transfer, TransferPlan};
 use stylet_report::pages::transfer::{difference, summary_sentence, warnings};
 use stylet_report::significant;
+
+/// A key by which the file of an earlier plan is recognised.
+const OWN_KEY: &[u8] = b"\"median_ratio\"";
 
 /// `stylet diagnose --transfer MODEL`.
 ///
@@ -22,7 +25,7 @@ pub fn diagnose(args: &DiagnoseArgs, model: &Path) -> Result<(), Failure> {
     let group = GroupFiles::new(args.scenario.as_deref(), &args.data, args.columns.as_deref(), args.repair)?;
     args.limits.check(&file, &resource_estimate::estimate_predict(&group.data), args.results.quiet)?;
     let folder = args.results.output_folder(&file, "-transfer");
-    let is_file = |p: &&std::path::PathBuf| p.is_file();
+    let is_file = |p: &&PathBuf| p.is_file();
     let others = group.data.iter().chain(&args.columns).chain(args.scenario.iter().filter(is_file));
     let read = args.results.inputs(&file, others);
     check_folder(&folder, "transfer.json", &read)?;
@@ -63,7 +66,7 @@ fn text(t: &Transfer) -> String {
 pub fn plan(args: &PlanArgs, model: &Path) -> Result<(), Failure> {
     let file = model_file(model);
     let out = args.out.clone().unwrap_or_else(|| default_folder(&file, "-plan").join("transfer_plan.json"));
-    let is_own = |bytes: &[u8]| bytes.windows(14).any(|window| window == b"\"median_ratio\"");
+    let is_own = |bytes: &[u8]| bytes.windows(OWN_KEY.len()).any(|window| window == OWN_KEY);
     check_own_file(&out, &[&file], None, is_own)?;
     let limit = args.resources.start_time_limit(&file);
     let varying = varying_factors(&args.same).unwrap_or_else(|| Factor::ALL.to_vec());
@@ -90,21 +93,21 @@ fn plan_text(plan: &TransferPlan) -> String {
     };
     let _ = writeln!(
         out,
-        "\n  floor {} N rms; the new group differs in {}\n\n  {:>10} {:>16} {:>18} {:>20}",
+        "\n  floor {} N rms; the new group differs in {}\n\n  {:>10} {:>16} {:>14} {:>20}",
         significant(plan.floor_n, 3),
         if what.is_empty() { "nothing".to_owned() } else { what.join(", ") },
         "insertions",
         "mm/s",
-        "within 10 %, prob.",
+        "within 10 %",
         "median error / floor"
     );
     for c in &plan.choices {
         let _ = writeln!(
             out,
-            "  {:>10} {:>16} {:>18.2} {:>20.2}",
+            "  {:>10} {:>16} {:>12.1} % {:>20.2}",
             c.insertions,
             speeds(&c.speeds_mps),
-            c.probability,
+            100.0 * c.probability,
             c.median_ratio
         );
     }

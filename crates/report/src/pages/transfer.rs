@@ -62,7 +62,7 @@ pub fn summary_sentence(t: &Transfer) -> String {
         ),
         TransferVerdict::Same => {
             format!(
-                "No difference from the model's group found (probability of none {}).",
+                "No difference from the model's group found (probability that there is none: {}).",
                 significant(t.probability_same, 2)
             )
         }
