@@ -12,6 +12,9 @@ use stylet_api::{DiagnoseOptions, resource_estimate};
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
+    if let Some(model) = &args.transfer {
+        return crate::cli::transfer::diagnose(args, model);
+    }
     let Some(file) = &args.scenario else {
         if args.repeats {
             return Err(Failure::Check("--repeats needs a scenario or a data set".to_owned()));

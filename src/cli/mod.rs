@@ -29,6 +29,7 @@ mod studio;
 mod sweep;
 mod terminal_output;
 mod text_plot;
+mod transfer;
 
 use args::{Cli, Command};
 use clap::Parser;

@@ -20,14 +20,22 @@ use stylet_scenario::Motion;
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
-    let limits = stylet_api::plan_insertion::load_limits(&args.limits)?;
-    let inputs = if args.from.is_dir() {
-        let mut inputs = DiagnosisInputs::from_folder(&args.from)?;
+    if let Some(model) = &args.transfer {
+        return crate::cli::transfer::plan(args, model);
+    }
+    let (Some(from), Some(limits_file)) = (&args.from, &args.limits) else {
+        return Err(Failure::Check(
+            "a plan needs a scenario or the folder of a diagnosis, and --limits".to_owned(),
+        ));
+    };
+    let limits = stylet_api::plan_insertion::load_limits(limits_file)?;
+    let inputs = if from.is_dir() {
+        let mut inputs = DiagnosisInputs::from_folder(from)?;
         inputs.effects.extend(args.effects.iter().cloned());
         inputs
     } else {
         DiagnosisInputs {
-            scenario: args.from.clone(),
+            scenario: from.clone(),
             effects: args.effects.clone(),
             data: args.data.clone(),
             columns: args.columns.clone(),
@@ -39,13 +47,13 @@ pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
         &resource_estimate::estimate_diagnose(&inputs.data),
         args.quiet,
     )?;
-    let out = args.out.clone().unwrap_or_else(|| default_folder(&args.from, "-plan").join("plan.ron"));
-    let mut read = vec![inputs.scenario.as_path(), args.limits.as_path()];
+    let out = args.out.clone().unwrap_or_else(|| default_folder(from, "-plan").join("plan.ron"));
+    let mut read = vec![inputs.scenario.as_path(), limits_file.as_path()];
     read.extend(inputs.data.iter().chain(&inputs.columns).chain(&inputs.effects).map(PathBuf::as_path));
     check_plan_files(&out, &read)?;
     let limit = args.resources.start_time_limit(&inputs.scenario);
     let progress = stage_printer(args.quiet, " ...");
-    let report = stylet_api::plan_insertion::plan(&inputs, (&args.limits, &limits), !args.quick, &progress)?;
+    let report = stylet_api::plan_insertion::plan(&inputs, (limits_file, &limits), !args.quick, &progress)?;
     drop(limit);
     check_plan_files(&out, &read)?;
     report.write(&out)?;

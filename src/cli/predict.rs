@@ -36,7 +36,7 @@ pub fn predict(args: &PredictArgs) -> Result<(), Failure> {
     let options = PredictionOptions {
         refit: refitted_parameters(args),
         refit_on: read_recordings(&args.refit_on, &read_options)?,
-        varying: varying_factors(args),
+        varying: varying_factors(&args.same),
     };
     let found =
         stylet_api::predict_recordings(&model, diagnosis.as_ref(), assumed.as_ref(), &options, &recordings)?;
@@ -58,16 +58,16 @@ fn refitted_parameters(args: &PredictArgs) -> Vec<Refit> {
 }
 
 /// Differences from the training recordings of the model; `None` without `--same`.
-fn varying_factors(args: &PredictArgs) -> Option<Vec<Factor>> {
+pub fn varying_factors(same: &[SameArg]) -> Option<Vec<Factor>> {
     let is_same = |f: &Factor| {
-        args.same.iter().any(|s| match s {
+        same.iter().any(|s| match s {
             SameArg::Group => true,
             SameArg::Needle => *f == Factor::Needle,
             SameArg::Tissue => *f == Factor::Tissue,
             SameArg::Setup => *f == Factor::Setup,
         })
     };
-    (!args.same.is_empty()).then(|| Factor::ALL.into_iter().filter(|f| !is_same(f)).collect())
+    (!same.is_empty()).then(|| Factor::ALL.into_iter().filter(|f| !is_same(f)).collect())
 }
 
 fn summary(p: &Prediction) -> String {

@@ -137,7 +137,7 @@ pub fn predict_recordings(
 }
 
 /// Checks the recordings and downsamples those that are too long.
-fn usable_recordings(recordings: &[NamedRecording]) -> Result<Vec<NamedRecording>, Error> {
+pub(crate) fn usable_recordings(recordings: &[NamedRecording]) -> Result<Vec<NamedRecording>, Error> {
     let mut notes_by_name: Vec<(&str, Vec<QualityNote>)> = Vec::with_capacity(recordings.len());
     for e in recordings {
         // Samples that are not finite are cut out by the diagnosis itself.

@@ -7,6 +7,7 @@
 //! | [`check`] | assumed [`Scenario`] and recordings | [`CheckReport`]: what they can show |
 //! | [`diagnose`](fn@diagnose) | assumed [`Scenario`] and recordings | [`DiagnosisReport`]: causes, re-fitted scenario |
 //! | [`predict_recordings`] | model and held-out recordings | errors, noise, coverage of the band |
+//! | [`transfer`] | model and recordings of another group | parameters that differ; plan of further recordings |
 //! | [`sweep`](fn@sweep) | [`Sweep`] | [`SweepResult`]: one row per insertion, summary |
 //! | [`diagnose_repeats`](fn@diagnose_repeats::diagnose_repeats), [`diagnose_specimens`](fn@diagnose_specimens::diagnose_specimens) | a data set | fitted models, variation between recordings or specimens |
 //! | [`plan`](fn@plan_insertion::plan), [`identifiability`](plan_insertion::identifiability) | [`DiagnosisInputs`] | the next insertion; what an experiment can identify |
@@ -40,6 +41,7 @@ pub mod run_report;
 mod simulate;
 pub mod sweep;
 pub mod sweep_folder;
+pub mod transfer;
 
 pub use check_experiment::{CheckReport, check};
 pub use diagnose::{DiagnosisReport, diagnose, identify, predict_recordings};

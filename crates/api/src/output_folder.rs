@@ -26,13 +26,14 @@ const COMPLETE: &str = ".stylet-set";
 const OLD: &str = ".stylet-old";
 
 /// The file by which the results of a command are recognised, and the command.
-const RESULT_FILES: [(&str, &str); 11] = [
+const RESULT_FILES: [(&str, &str); 12] = [
     ("score.json", "run"),
     ("enhance.json", "enhance"),
     ("check.json", "check"),
     ("consistency.json", "compare-models"),
     ("diagnosis.json", "diagnose"),
     ("predict.json", "predict"),
+    ("transfer.json", "diagnose --transfer"),
     ("identifiability.json", "identifiability"),
     ("summary.json", "sweep"),
     ("compare.json", "compare"),

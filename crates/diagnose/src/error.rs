@@ -127,6 +127,11 @@ pub enum DiagnoseError {
         /// The reasons.
         reasons: String,
     },
+    /// The diagnosis does not have the curves of its recordings.
+    #[error(
+        "the diagnosis.json of the model does not have the curves of its recordings (`training`); repeat the diagnosis"
+    )]
+    NoTrainingSummary,
     /// The base law could not be fitted.
     #[error("the base law cannot be fitted to these recordings: a replay gives no finite force")]
     NoFit,

@@ -14,14 +14,21 @@ use stylet_api::DiagnosisInputs;
   stylet diagnose scenario.ron --repeats --data run1.csv run2.csv run3.csv --columns map.ron
   stylet diagnose scenarios/measured/skin_on_muscle.ron
   stylet diagnose --data log1.csv log2.csv
+  stylet diagnose --transfer out/monday --data tuesday1.csv tuesday2.csv
+  stylet diagnose --transfer out/monday out/tuesday
 
 Writes report.html, diagnosis.json and extended.ron: the scenario with re-fitted parameters and the
-effects found, for `stylet run` (with --motion if the scenario says `Recorded`). The exit code is 0
-whatever the verdict, 1 when no recording touches the tissue, 2 when an input or a recording is wrong.")]
+effects found, for `stylet run` (with --motion if the scenario says `Recorded`); with --transfer
+report.html and transfer.json. The exit code is 0 whatever the verdict, 1 when no recording touches the tissue, 2 when an input or a recording is wrong.")]
 pub struct DiagnoseArgs {
     /// Assumed scenario, or a data set of repeated insertions (RON). Without one the layers are those that
-    /// the recordings show, as `stylet identify` finds them.
+    /// the recordings show, as `stylet identify` finds them. With --transfer a data set, or the folder of
+    /// a diagnosis, whose recordings are the other group.
     pub scenario: Option<PathBuf>,
+    /// Compare the recordings with those that made this model (folder of a diagnosis, or its extended.ron):
+    /// which of surface, force, friction and puncture force differ, or whether they follow another law.
+    #[arg(long, value_name = "MODEL", conflicts_with_all = ["repeats", "effects", "force"])]
+    pub transfer: Option<PathBuf>,
     /// Treat the recordings as repeats of one insertion: separate the variation between recordings from
     /// what the model lacks, and predict each recording by the others. A data set implies it.
     #[arg(long)]
@@ -238,19 +245,28 @@ pub struct IdentifiabilityArgs {
   stylet plan out/diagnosis --limits limits.ron --out plan.ron
   stylet plan scenario.ron --data a.csv --limits limits.ron --out plan.ron
   stylet plan scenario.ron --limits limits.ron --quick
+  stylet plan --transfer out/diagnosis --same tissue,setup
 
 limits.ron: Limits(depth_m: 0.09, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0)
 
 Writes plan.ron, plan.json and plan.html. `stylet run scenario.ron --motion plan.ron` simulates the motion;
 after the experiment diagnose old and new recordings together. Without recordings the scenario's own motion
-counts as done. The exit code is 2 when no motion keeps the limits.")]
+counts as done. The exit code is 2 when no motion keeps the limits. With --transfer it writes transfer_plan.json.")]
 pub struct PlanArgs {
     /// Folder of a diagnosis, or a scenario (RON).
-    pub from: PathBuf,
+    #[arg(required_unless_present = "transfer")]
+    pub from: Option<PathBuf>,
     /// Limits of depth, speed, acceleration, duration and force (RON).
-    #[arg(long, value_name = "FILE")]
-    pub limits: PathBuf,
-    /// File for the motion [default: stylet-out/<name>-plan/plan.ron].
+    #[arg(long, value_name = "FILE", required_unless_present = "transfer")]
+    pub limits: Option<PathBuf>,
+    /// Plan insertions with another needle, in another specimen or with another set-up: how many, and at which
+    /// of its speeds, let this model (folder of a diagnosis, or its extended.ron) predict as well as it can.
+    #[arg(long, value_name = "MODEL", conflicts_with_all = ["from", "limits", "data", "effects", "columns", "quick"])]
+    pub transfer: Option<PathBuf>,
+    /// With --transfer: what is the same as when the model was made.
+    #[arg(long, value_name = "FACTORS", value_delimiter = ',', requires = "transfer")]
+    pub same: Vec<SameArg>,
+    /// File for the motion [default: stylet-out/<name>-plan/plan.ron], or with --transfer for the plan.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
     /// With a scenario: recordings made so far (CSV with header).

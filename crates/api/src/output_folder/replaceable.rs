@@ -6,11 +6,12 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Files of each command, by its result file; checked before a long computation. The set itself is checked when it is written.
-const FILES: [(&str, &[&str]); 9] = [
+const FILES: [(&str, &[&str]); 10] = [
     ("score.json", &["recording.csv", "score.json", "scenario.ron", "figure.svg", "report.html"]),
     ("enhance.json", &["enhance.json", "events.json", "figure.svg", "report.html", "enhanced.csv"]),
     ("diagnosis.json", &["report.html", "diagnosis.json", "figure.svg", "extended.ron", "gain.svg"]),
     ("predict.json", &["report.html", "predict.json"]),
+    ("transfer.json", &["report.html", "transfer.json"]),
     ("identifiability.json", &["report.html", "identifiability.json", "matrix.svg"]),
     (
         "summary.json",

@@ -27,6 +27,12 @@ pub enum Refit {
 impl Refit {
     /// All parameters, in the order of the deviations: surface, force, friction, puncture force.
     pub const ALL: [Self; PARAMETERS] = [Self::Surface, Self::Force, Self::Friction, Self::Puncture];
+
+    /// The shift in m for a deviation of the surface, else the factor.
+    #[must_use]
+    pub fn shift_or_factor(self, deviation: f64) -> f64 {
+        if self == Self::Surface { deviation } else { libm::exp(deviation) }
+    }
 }
 
 /// What differs between groups of recordings.

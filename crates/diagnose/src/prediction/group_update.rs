@@ -19,6 +19,8 @@ const DERIVATIVE_STEP: f64 = 0.25;
 const MAX_HALVINGS: usize = 6;
 /// Start values of the surface, in standard deviations of the prior.
 const SURFACE_STARTS: [f64; 9] = [0.0, -1.0, 1.0, -2.0, 2.0, -3.0, 3.0, -4.0, 4.0];
+/// Start values of the puncture force, in standard deviations of the prior: a rupture far from the measured one attracts no gradient.
+const PUNCTURE_STARTS: [f64; 5] = [0.0, -1.0, 1.0, -2.0, 2.0];
 
 /// Estimated deviation of one recording.
 #[derive(Clone, Debug)]
@@ -54,73 +56,122 @@ impl Observation<'_> {
     }
 }
 
-/// Fits the deviation of one recording; `force` predicts its blocks (N) for a deviation.
+/// Derivatives of the force in every block by the deviation in units of `sd`, at the deviation `v` in these units; zero where `sd` is.
+pub fn slopes(
+    force: &impl Fn(&Values) -> Option<Vec<f64>>,
+    v: &Values,
+    sd: &Values,
+    blocks: usize,
+) -> Vec<Vec<f64>> {
+    (0..PARAMETERS)
+        .map(|j| {
+            let moved =
+                |by: f64| force(&std::array::from_fn(|k| sd[k] * (v[k] + if k == j { by } else { 0.0 })));
+            let both = (sd[j] > 0.0).then(|| moved(-DERIVATIVE_STEP).zip(moved(DERIVATIVE_STEP)));
+            both.flatten().map_or_else(
+                || vec![0.0; blocks],
+                |(a, b)| a.iter().zip(&b).map(|(a, b)| (b - a) / (2.0 * DERIVATIVE_STEP)).collect(),
+            )
+        })
+        .collect()
+}
+
+/// Fits the deviation of one recording; `force` predicts its blocks (N) for a deviation. The best of the minima from several starts is kept.
 pub fn estimate_recording(
     observed: &Observation,
     force: impl Fn(&Values) -> Option<Vec<f64>>,
     prior_sd: Values,
 ) -> Option<RecordingEstimate> {
-    let scaled = |v: &Values| -> Values { std::array::from_fn(|j| v[j] * prior_sd[j]) };
-    let at = |v: &Values| -> Option<(f64, Vec<f64>)> {
-        let f = force(&scaled(v))?;
-        Some((observed.nats(&f) + 0.5 * v.iter().map(|v| v * v).sum::<f64>(), f))
-    };
-    let mut v = [0.0; PARAMETERS];
-    let (mut nats, mut predicted) = at(&v)?;
-    for start in SURFACE_STARTS.iter().filter(|_| prior_sd[0] > 0.0) {
-        let trial = [*start, 0.0, 0.0, 0.0];
-        if let Some((trial_nats, f)) = at(&trial)
-            && trial_nats < nats
-        {
-            (v, nats, predicted) = (trial, trial_nats, f);
+    let fit = RecordingFit { observed, force, prior_sd };
+    let free = |starts: &'static [f64], k: usize| if prior_sd[k] > 0.0 { starts } else { &starts[..1] };
+    let mut best: Option<(f64, RecordingEstimate)> = None;
+    for puncture in free(&PUNCTURE_STARTS, 3) {
+        let starts = free(&SURFACE_STARTS, 0).iter().map(|surface| [*surface, 0.0, 0.0, *puncture]);
+        let start = starts
+            .filter_map(|v| fit.at(v))
+            .reduce(|best, next| if next.nats < best.nats { next } else { best });
+        let Some((nats, found)) = start.map(|start| fit.minimum(start)) else { continue };
+        if best.as_ref().is_none_or(|(least, _)| nats < *least) {
+            best = Some((nats, found));
         }
     }
-    let mut information = SymmetricMatrix::zeros(PARAMETERS);
-    for _ in 0..MAX_ITERATIONS {
-        let slopes: Vec<Vec<f64>> = (0..PARAMETERS)
-            .map(|j| {
-                let moved = |by: f64| {
-                    let mut moved = v;
-                    moved[j] += by;
-                    force(&scaled(&moved))
-                };
-                let both = (prior_sd[j] > 0.0).then(|| moved(-DERIVATIVE_STEP).zip(moved(DERIVATIVE_STEP)));
-                both.flatten().map_or_else(
-                    || vec![0.0; predicted.len()],
-                    |(a, b)| a.iter().zip(&b).map(|(a, b)| (b - a) / (2.0 * DERIVATIVE_STEP)).collect(),
-                )
-            })
-            .collect();
-        information = SymmetricMatrix::zeros(PARAMETERS);
-        let mut gradient = v.map(|v| -v);
-        for (k, e) in observed.residuals(&predicted) {
-            for i in 0..PARAMETERS {
-                gradient[i] += observed.weight * slopes[i][k] * e;
-                (0..=i).for_each(|j| information.add(i, j, observed.weight * slopes[i][k] * slopes[j][k]));
+    best.map(|(_, estimate)| estimate)
+}
+
+/// A recording with its prior.
+struct RecordingFit<'a, F> {
+    observed: &'a Observation<'a>,
+    force: F,
+    prior_sd: Values,
+}
+
+/// A trial deviation.
+struct Trial {
+    /// Deviation in standard deviations of the prior.
+    v: Values,
+    /// Negative log posterior.
+    nats: f64,
+    /// Predicted force in N.
+    predicted: Vec<f64>,
+}
+
+impl<F: Fn(&Values) -> Option<Vec<f64>>> RecordingFit<'_, F> {
+    fn scaled(&self, v: &Values) -> Values {
+        std::array::from_fn(|j| v[j] * self.prior_sd[j])
+    }
+
+    fn at(&self, v: Values) -> Option<Trial> {
+        let predicted = (self.force)(&self.scaled(&v))?;
+        let nats = self.observed.nats(&predicted) + 0.5 * v.iter().map(|v| v * v).sum::<f64>();
+        Some(Trial { v, nats, predicted })
+    }
+
+    /// Local minimum (Gauss-Newton) and its negative log posterior.
+    fn minimum(&self, start: Trial) -> (f64, RecordingEstimate) {
+        let mut here = start;
+        let mut information = SymmetricMatrix::zeros(PARAMETERS);
+        let weight = self.observed.weight;
+        for _ in 0..MAX_ITERATIONS {
+            let slopes = slopes(&self.force, &here.v, &self.prior_sd, here.predicted.len());
+            information = SymmetricMatrix::zeros(PARAMETERS);
+            let mut gradient = here.v.map(|v| -v);
+            for (k, e) in self.observed.residuals(&here.predicted) {
+                for i in 0..PARAMETERS {
+                    gradient[i] += weight * slopes[i][k] * e;
+                    (0..=i).for_each(|j| information.add(i, j, weight * slopes[i][k] * slopes[j][k]));
+                }
+            }
+            let step = with_identity(&information).solve(&gradient);
+            let shares = (0..=MAX_HALVINGS).map(|k| libm::exp2(-(k as f64)));
+            let better = shares
+                .filter_map(|share| self.at(std::array::from_fn(|j| here.v[j] + share * step[j])))
+                .find(|trial| trial.nats < here.nats);
+            let Some(next) = better else { break };
+            let gain = here.nats - next.nats;
+            here = next;
+            if gain < MIN_GAIN_NATS {
+                break;
             }
         }
-        let step = with_identity(&information).solve(&gradient);
-        let trials = (0..=MAX_HALVINGS).map(|k| libm::exp2(-(k as f64)));
-        let better = trials
-            .filter_map(|share| {
-                let trial: Values = std::array::from_fn(|j| v[j] + share * step[j]);
-                at(&trial).map(|(n, f)| (n, trial, f))
-            })
-            .find(|(n, ..)| *n < nats);
-        let Some((next, trial, f)) = better else { break };
-        let gain = nats - next;
-        (v, nats, predicted) = (trial, next, f);
-        if gain < MIN_GAIN_NATS {
-            break;
-        }
+        let per_sd = self.prior_sd.map(|sd| if sd > 0.0 { 1.0 / sd } else { 0.0 });
+        let found = RecordingEstimate {
+            deviation: self.scaled(&here.v),
+            information: rescaled(&information, &per_sd),
+            prior_sd: self.prior_sd,
+        };
+        (here.nats, found)
     }
-    let mut unscaled = SymmetricMatrix::zeros(PARAMETERS);
-    for i in 0..PARAMETERS {
-        for j in (0..=i).filter(|j| prior_sd[i] > 0.0 && prior_sd[*j] > 0.0) {
-            unscaled.add(i, j, information.at(i, j) / (prior_sd[i] * prior_sd[j]));
-        }
+}
+
+impl RecordingEstimate {
+    /// Information matrix times the deviation that would fit the recording best without a prior.
+    fn weighted(&self) -> Values {
+        let pull = product(&self.information, &self.deviation);
+        std::array::from_fn(|k| {
+            let sd = self.prior_sd[k];
+            pull[k] + if sd > 0.0 { self.deviation[k] / (sd * sd) } else { 0.0 }
+        })
     }
-    Some(RecordingEstimate { deviation: scaled(&v), information: unscaled, prior_sd })
 }
 
 /// Cholesky factor of a matrix plus the identity.
@@ -139,8 +190,60 @@ fn rescaled(matrix: &SymmetricMatrix, by: &Values) -> SymmetricMatrix {
     out
 }
 
-fn product(matrix: &SymmetricMatrix, by: &Values) -> Values {
+/// Product of a matrix and a vector.
+pub fn product(matrix: &SymmetricMatrix, by: &Values) -> Values {
     std::array::from_fn(|i| (0..PARAMETERS).map(|j| matrix.at(i, j) * by[j]).sum())
+}
+
+/// Information of a group's recordings on its deviation.
+#[derive(Clone, Debug)]
+pub struct GroupInformation {
+    /// Information matrix.
+    information: SymmetricMatrix,
+    /// Information matrix times the deviation that fits best.
+    weighted: Values,
+}
+
+impl GroupInformation {
+    /// Without a recording.
+    #[must_use]
+    pub fn none() -> Self {
+        Self { information: SymmetricMatrix::zeros(PARAMETERS), weighted: [0.0; PARAMETERS] }
+    }
+
+    /// Information of recordings that scatter by `recording_sd`.
+    #[must_use]
+    pub fn new(recordings: &[&RecordingEstimate], recording_sd: &Values) -> Self {
+        let mut out = Self::none();
+        recordings.iter().for_each(|r| out.add(&r.information, &r.weighted(), recording_sd));
+        out
+    }
+
+    /// Adds a recording with its information matrix, and that matrix times its best deviation.
+    pub fn add(&mut self, information: &SymmetricMatrix, weighted: &Values, recording_sd: &Values) {
+        // (A^-1 + R^2)^-1 = A - A R (1 + R A R)^-1 R A, without an inverse of A.
+        let inner = with_identity(&rescaled(information, recording_sd));
+        let reduced = |x: &Values| -> Values {
+            let scaled: Vec<f64> = x.iter().zip(recording_sd).map(|(x, sd)| x * sd).collect();
+            let solved = inner.solve(&scaled);
+            let back: Values = std::array::from_fn(|k| recording_sd[k] * solved[k]);
+            let less = product(information, &back);
+            std::array::from_fn(|k| x[k] - less[k])
+        };
+        for j in 0..PARAMETERS {
+            let column = reduced(&std::array::from_fn(|i| information.at(i, j)));
+            (j..PARAMETERS).for_each(|i| self.information.add(i, j, column[i]));
+        }
+        let of_group = reduced(weighted);
+        (0..PARAMETERS).for_each(|k| self.weighted[k] += of_group[k]);
+    }
+
+    /// The same multiplied by `share`.
+    #[must_use]
+    pub fn times(&self, share: f64) -> Self {
+        let root = [share.sqrt(); PARAMETERS];
+        Self { information: rescaled(&self.information, &root), weighted: self.weighted.map(|w| share * w) }
+    }
 }
 
 /// Distribution of a group's deviation.
@@ -152,6 +255,8 @@ pub struct GroupEstimate {
     pub full_mean: Values,
     /// Probability that each parameter deviates.
     pub probability: Values,
+    /// Probability that none deviates.
+    pub probability_of_none: f64,
     /// Standard deviations before the update.
     prior_sd: Values,
     /// Factor of the precision with all parameters, relative to the prior's.
@@ -167,9 +272,9 @@ struct Subset {
 }
 
 impl Subset {
-    fn new(information: &SymmetricMatrix, weighted: &Values, sd: &Values) -> Self {
-        let precision = with_identity(&rescaled(information, sd));
-        let scaled: Values = std::array::from_fn(|k| sd[k] * weighted[k]);
+    fn new(known: &GroupInformation, sd: &Values) -> Self {
+        let precision = with_identity(&rescaled(&known.information, sd));
+        let scaled: Values = std::array::from_fn(|k| sd[k] * known.weighted[k]);
         let solved = precision.solve(&scaled);
         let gain: f64 = scaled.iter().zip(&solved).map(|(a, b)| a * b).sum();
         Self {
@@ -184,56 +289,41 @@ impl GroupEstimate {
     /// Estimate from recordings of the group, which may be none.
     #[must_use]
     pub fn new(recordings: &[&RecordingEstimate], group_sd: Values, recording_sd: Values) -> Self {
-        let mut information = SymmetricMatrix::zeros(PARAMETERS);
-        let mut weighted = [0.0; PARAMETERS];
-        for r in recordings {
-            // (A^-1 + R^2)^-1 = A - A R (1 + R A R)^-1 R A, without an inverse of A.
-            let inner = with_identity(&rescaled(&r.information, &recording_sd));
-            let reduced = |x: &Values| -> Values {
-                let scaled: Vec<f64> = x.iter().zip(&recording_sd).map(|(x, sd)| x * sd).collect();
-                let solved = inner.solve(&scaled);
-                let back: Values = std::array::from_fn(|k| recording_sd[k] * solved[k]);
-                let less = product(&r.information, &back);
-                std::array::from_fn(|k| x[k] - less[k])
-            };
-            for j in 0..PARAMETERS {
-                let column = reduced(&std::array::from_fn(|i| r.information.at(i, j)));
-                (j..PARAMETERS).for_each(|i| information.add(i, j, column[i]));
-            }
-            let pull = product(&r.information, &r.deviation);
-            let normal: Values = std::array::from_fn(|k| {
-                let sd = r.prior_sd[k];
-                pull[k] + if sd > 0.0 { r.deviation[k] / (sd * sd) } else { 0.0 }
-            });
-            let of_group = reduced(&normal);
-            (0..PARAMETERS).for_each(|k| weighted[k] += of_group[k]);
-        }
+        Self::from_information(&GroupInformation::new(recordings, &recording_sd), group_sd)
+    }
+
+    /// Estimate from the information of the recordings.
+    #[must_use]
+    pub fn from_information(known: &GroupInformation, group_sd: Values) -> Self {
         let free: Vec<usize> = (0..PARAMETERS).filter(|k| group_sd[*k] > 0.0).collect();
         let subsets: Vec<(Values, Subset)> = (0..1_usize << free.len())
             .map(|mask| {
                 let is_in =
                     |k: usize| free.iter().position(|f| *f == k).is_some_and(|bit| mask >> bit & 1 == 1);
                 let sd = std::array::from_fn(|k| if is_in(k) { group_sd[k] } else { 0.0 });
-                (sd, Subset::new(&information, &weighted, &sd))
+                (sd, Subset::new(known, &sd))
             })
             .collect();
         let best = subsets.iter().map(|(_, s)| s.ln_evidence).fold(f64::NEG_INFINITY, f64::max);
         let others = (subsets.len() - 1).max(1) as f64;
         let (mut mean, mut probability, mut total) = ([0.0; PARAMETERS], [0.0; PARAMETERS], 0.0);
+        let mut none = 0.0;
         for (mask, (sd, subset)) in subsets.iter().enumerate() {
             let prior = if mask == 0 { others } else { 1.0 };
             let weight = prior * libm::exp(subset.ln_evidence - best);
             total += weight;
+            none += if mask == 0 { weight } else { 0.0 };
             for k in 0..PARAMETERS {
                 mean[k] += weight * subset.mean[k];
                 probability[k] += if sd[k] > 0.0 { weight } else { 0.0 };
             }
         }
-        let full = Subset::new(&information, &weighted, &group_sd);
+        let full = Subset::new(known, &group_sd);
         Self {
             mean: mean.map(|m| m / total),
             full_mean: full.mean,
             probability: probability.map(|p| p / total),
+            probability_of_none: none / total,
             prior_sd: group_sd,
             precision: full.precision,
         }

@@ -9,11 +9,15 @@
 //! | `training_curves`, `training_summary` | curves, discrepancy and scatter of the training recordings |
 //! | `group_deviation` | deviation of another group of recordings, with its prior |
 //! | `group_update` | Gaussian update of a group's deviation |
-//! | `refit` | fit of a group's deviation, and whether it is used |
+//! | `group_fit` | fit of the deviations of a group's recordings |
+//! | `refit` | whether a group's deviation is used |
+//! | `transfer` | in which parameters a group differs from that which made the model |
+//! | `transfer_plan` | how many recordings of a new group its prediction needs |
 //! | `uncertainty`, `prediction_band` | draws of the next recording, and their band |
 //! | `prepared`, `target`, `predicted_recording` | prediction of one recording |
 
 mod group_deviation;
+mod group_fit;
 mod group_update;
 mod insertion_course;
 mod predicted_recording;
@@ -23,6 +27,8 @@ mod refit;
 mod target;
 mod training_curves;
 mod training_summary;
+mod transfer;
+mod transfer_plan;
 mod uncertainty;
 
 use crate::base_law_fit::assumptions_of;
@@ -30,6 +36,7 @@ use crate::diagnosis_json::Diagnosis;
 use crate::error::DiagnoseError;
 use crate::input_checks::NamedRecording;
 pub use group_deviation::{Factor, Refit};
+use group_fit::GroupFit;
 use predicted_recording::ErrorSums;
 pub use predicted_recording::{PredictionCurves, RecordingPrediction};
 pub use prediction_band::BAND_LEVEL;
@@ -41,6 +48,11 @@ use stylet_scenario::Scenario;
 use stylet_stats::parallel::*;
 use target::Target;
 pub use training_curves::{TrainingRun, TrainingSummary};
+pub use transfer::{
+    MAX_MISFIT_RATIO, ParameterTransfer, RecordingTransfer, Transfer, TransferResult, TransferVerdict,
+    compare_groups,
+};
+pub use transfer_plan::{PlannedInsertions, TransferPlan, plan_transfer};
 
 /// Options of a prediction.
 #[derive(Clone, Debug, Default)]
@@ -152,7 +164,8 @@ pub fn predict(
     let refit = if options.refit.is_empty() {
         None
     } else {
-        let refit = refit::GroupRefit::new(&prepared, training, &targets, &options.refit, &varying, &fitted);
+        let fit = GroupFit::new(&prepared, training, &targets, &options.refit, &varying, &fitted);
+        let refit = fit.and_then(|fit| refit::GroupRefit::new(fit, prepared.misfit_n(training)));
         Some(refit.ok_or(DiagnoseError::NoFit)?)
     };
     let before = assumed.map(|b| Model::base(std::sync::Arc::new(assumptions_of(b)), all.len()));

@@ -5,7 +5,7 @@ use super::insertion_course::{BINS, Curve, DepthRange, mean_curve, pooled};
 use serde::{Deserialize, Serialize};
 
 /// Largest relative difference of the speeds of comparable recordings.
-const SPEED_TOLERANCE: f64 = 0.1;
+pub const SPEED_TOLERANCE: f64 = 0.1;
 /// Largest difference (m) of the deepest positions of comparable recordings.
 const STROKE_TOLERANCE_M: f64 = 1e-3;
 /// Largest difference of the curves of one and the same recording, as a share of the largest force.
@@ -29,7 +29,8 @@ pub struct TrainingRun {
 }
 
 impl TrainingRun {
-    fn is_like(&self, speed_mps: f64, stroke_m: f64) -> bool {
+    /// Whether a recording at this speed and stroke is comparable.
+    pub fn is_like(&self, speed_mps: f64, stroke_m: f64) -> bool {
         (self.speed_mps - speed_mps).abs() <= SPEED_TOLERANCE * speed_mps
             && (self.stroke_m - stroke_m).abs() <= STROKE_TOLERANCE_M
     }

@@ -17,3 +17,4 @@ pub mod online_benchmark;
 pub mod prediction;
 pub mod repeated_insertions;
 pub mod sweep;
+pub mod transfer;

@@ -3,11 +3,11 @@
 use crate::chart_model::{Chart, Level, LineStyle, MarkerSet, Series, Side};
 use crate::page_model::{Cell, Page, Section, Status, Table, Tile};
 use crate::pages::formatting::{or_dash, significant_or_dash};
+use crate::pages::transfer::difference;
 use crate::palette::Colour;
-use stylet_diagnose::prediction::{
-    Prediction, PredictionCurves, PredictionResult, RecordingPrediction, Refit,
-};
+use stylet_diagnose::prediction::{Prediction, PredictionCurves, PredictionResult, RecordingPrediction};
 use stylet_scenario::Scenario;
+use stylet_stats::Z95;
 use stylet_stats::number_format::significant;
 
 /// Largest number of recordings with individual charts.
@@ -110,19 +110,12 @@ pub fn refit_sentence(p: &Prediction) -> Option<String> {
     let parameters: Vec<String> = refit
         .parameters
         .iter()
-        .map(|f| match f.parameter {
-            Refit::Surface => format!("surface {:+.2} ± {:.2} mm", 1e3 * f.value, 2e3 * f.sd),
-            Refit::Force => factor_text("force", f.value, f.sd),
-            Refit::Friction => factor_text("friction", f.value, f.sd),
-            Refit::Puncture => factor_text("puncture", f.value, f.sd),
+        .map(|f| {
+            let at = |sds: f64| f.parameter.shift_or_factor(f.value + sds * f.sd);
+            difference(f.parameter, at(0.0), at(-Z95), at(Z95))
         })
         .collect();
     Some(format!("Refitted group (95 %): {}; {errors}.", parameters.join(", ")))
-}
-
-fn factor_text(name: &str, ln_factor: f64, sd: f64) -> String {
-    let at = |sds: f64| significant(libm::exp(ln_factor + sds * sd), 3);
-    format!("{name} x {} ({} to {})", at(0.0), at(-stylet_stats::Z95), at(stylet_stats::Z95))
 }
 
 /// A sentence for each mean curve that predicts better than the model.

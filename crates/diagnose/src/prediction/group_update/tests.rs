@@ -1,5 +1,5 @@
 use super::super::group_deviation::Values;
-use super::{GroupEstimate, Observation, RecordingEstimate, estimate_recording};
+use super::{GroupEstimate, GroupInformation, Observation, RecordingEstimate, estimate_recording};
 
 const GROUP_SD: Values = [2e-3, 0.3, 0.2, 0.1];
 const RECORDING_SD: Values = [2e-4, 0.03, 0.04, 0.05];
@@ -66,4 +66,34 @@ fn a_parameter_without_a_spread_does_not_move() {
     let group = GroupEstimate::new(&[&found], [0.0, 0.3, 0.0, 0.0], RECORDING_SD);
     assert!(group.mean[1] > 0.25 && group.is_free(1) && !group.is_free(0), "{group:?}");
     assert_eq!((group.mean[0], group.sd()[0], group.draw(&[1.0; 4])[0]), (0.0, 0.0, 0.0));
+}
+
+/// With a wide prior, half the information leaves the mean and doubles the variance.
+#[test]
+fn the_variance_is_inverse_to_the_information() {
+    let estimates: Vec<RecordingEstimate> =
+        (0..4).map(|_| estimate(&[1e-3, -0.3, 0.2, 0.1], wide())).collect();
+    let whole = GroupInformation::new(&estimates.iter().collect::<Vec<_>>(), &RECORDING_SD);
+    let very_wide = GROUP_SD.map(|sd| 100.0 * sd);
+    let all = GroupEstimate::from_information(&whole, very_wide);
+    let half = GroupEstimate::from_information(&whole.times(0.5), very_wide);
+    for k in 0..4 {
+        assert!((half.full_mean[k] / all.full_mean[k] - 1.0).abs() < 1e-3, "{k}: {half:?}");
+        assert!((half.sd()[k] / all.sd()[k] / 2.0_f64.sqrt() - 1.0).abs() < 1e-3, "{k}: {half:?}");
+    }
+}
+
+/// A rupture that the model places far away attracts no gradient; another start finds it.
+#[test]
+fn a_far_rupture_is_found() {
+    // The force rises over 200 blocks and falls to zero once it exceeds the puncture force.
+    let force = |u: &Values| -> Vec<f64> {
+        let puncture = 60.0 * libm::exp(u[3]);
+        (0..200).map(|k| if f64::from(k) < puncture { f64::from(k) } else { 0.0 }).collect()
+    };
+    let (y, used) = (force(&[0.0, 0.0, 0.0, 0.7]), vec![true; 200]);
+    let observed = Observation { force_n: &y, used: &used, weight: 0.01 };
+    let found =
+        estimate_recording(&observed, |u| Some(force(u)), [0.0, 0.0, 0.0, 0.37]).expect("an estimate");
+    assert!((found.deviation[3] - 0.7).abs() < 0.05, "{found:?}");
 }
