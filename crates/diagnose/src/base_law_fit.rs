@@ -1,7 +1,7 @@
 //! Fits the base law to the recordings: assigns force drops to layers, then fits parameters and rupture times in turn.
 
 use crate::random_effect_selection::select_random_effects;
-use crate::verdict::leaves_slow_noise;
+use crate::slow_noise::leaves_slow_noise;
 use std::sync::Arc;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::{Effort, Fit, fit, fit_from_zero_scatter};

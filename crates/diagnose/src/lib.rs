@@ -68,6 +68,7 @@ mod rupture_start_values;
 mod selection_restarts;
 mod selection_state;
 mod sensor_artefact_causes;
+mod slow_noise;
 #[cfg(test)]
 mod test_fixtures;
 pub mod tone_detection;

@@ -1,7 +1,9 @@
 //! Negligible effects: selected by the search, but too small to matter or without improvement on held-out recordings.
 
 use crate::diagnosis_json::Cause;
-use crate::held_out::{FreeRunResidual, held_out_residuals_with_random_effects, pooled_rms};
+use crate::held_out::{
+    FreeRunResidual, held_out_residuals_with_random_effects, pooled_rms, sample_noise_sd_n,
+};
 use crate::selection_state::Search;
 use stylet_identify::fit::{Effort, fit};
 use stylet_stats::parallel::*;
@@ -15,6 +17,8 @@ pub struct Negligible {
     pub reason: String,
 }
 
+/// Smallest change of the held-out RMS by a cause, as a share of the noise.
+const MIN_RMS_CHANGE: f64 = 0.002;
 /// Gain (nats per block) below which a cause must improve the held-out RMS.
 const STRONG_NATS_PER_BLOCK: f64 = 0.3;
 
@@ -53,10 +57,13 @@ pub fn negligible_effects(
         }
         let without_n =
             pooled_rms(&held_out_residuals_with_random_effects(&reduced, &search.data), &search.data);
-        if without_n < with_n {
+        let gained = (without_n - with_n) / sample_noise_sd_n(&search.data);
+        if gained >= MIN_RMS_CHANGE {
+            None
+        } else if gained < 0.0 {
             because("does not improve the prediction of held-out recordings")
         } else {
-            None
+            because("changes the prediction of held-out recordings by less than 0.2 % of the noise")
         }
     };
     causes.par_iter().filter_map(assess).collect()

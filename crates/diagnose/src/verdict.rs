@@ -14,6 +14,7 @@ use crate::outlier_segment_test::outlier_segment_p_value;
 use crate::parameter_labels::label_parameters;
 use crate::residual_tests::test_residuals;
 use crate::selection_state::Search;
+use crate::slow_noise::{MIN_EXCESS_SLOW, excess};
 use crate::tone_detection::{detect_tones, with_noise_without_tones};
 use crate::varying_coefficient_test::{FEATURES, VaryingCoefficient, varying_coefficient_test};
 use rand::{SeedableRng, rngs::ChaCha8Rng};
@@ -30,8 +31,6 @@ use stylet_tissue::EffectInfo;
 /// p-value below which the residual has structure. It is small because sums over pairs of recordings have longer tails than their skewness
 /// implies.
 const MAX_STRUCTURE_P_VALUE: f64 = 1e-6;
-/// Corrected p-value above which a residual has no structure that is worth a longer search.
-const MIN_NOISE_P_VALUE: f64 = 0.01;
 /// Unexplained share of the base law's residual variance above the noise from which the verdict is `unknown`.
 const MAX_UNEXPLAINED_SHARE: f64 = 0.1;
 /// Excess variance of the residual, in units of the noise variance, from which it counts as unexplained.
@@ -39,8 +38,6 @@ const MIN_EXCESS: f64 = 0.8;
 /// Excess variance from which the residual of a single recording counts as unexplained: its structure is not distinguishable from slow
 /// noise.
 const MIN_EXCESS_SINGLE: f64 = 3.0;
-/// Excess variance from which a residual is not noise, whatever its autocorrelation: a slow standard deviation of 2.5 times the fast one.
-const MIN_EXCESS_SLOW: f64 = 6.0;
 /// Gain of the varying-coefficient test, as a share of the largest gain of an effect, from which an effect is an imitation.
 const MIN_IMITATION_SHARE: f64 = 0.02;
 /// Smallest gain (nats) of that test for an imitation: chance gives half a nat, and an inexact motion some tens.
@@ -72,42 +69,6 @@ pub(crate) struct Assessment {
     pub unknown: bool,
     /// Whether the residual has tones.
     pub has_tones: bool,
-}
-
-/// Excess variance of a residual in units of the noise variance, with outliers limited.
-fn excess(data: &FitData, e: &[Vec<f64>]) -> f64 {
-    /// Residuals are limited to this many standard deviations.
-    const OUTLIER_LIMIT_SD: f64 = 6.0;
-    /// Blocks excluded on both sides of a velocity jump of uncertain time.
-    const JUMP_MARGIN_BLOCKS: usize = 4;
-    let (mut sum, mut n) = (0.0, 0.0);
-    for (b, e) in data.recordings.iter().zip(e) {
-        let mut near = vec![false; b.len()];
-        for jump in &b.motion.jumps {
-            let (lo, hi) =
-                (b.block_at(jump.time_s - jump.time_sd_s), b.block_at(jump.time_s + jump.time_sd_s));
-            let (lo, hi) =
-                (lo.saturating_sub(JUMP_MARGIN_BLOCKS), (hi + JUMP_MARGIN_BLOCKS + 1).min(b.len()));
-            near[lo.min(hi)..hi].fill(true);
-        }
-        for k in (0..b.len()).filter(|k| b.used[*k] && !near[*k]) {
-            let sd = data.noise.bin_at(b.abs_force_n[k]).sd_n;
-            sum += (e[k] / sd).powi(2).min(OUTLIER_LIMIT_SD * OUTLIER_LIMIT_SD);
-            n += 1.0;
-        }
-    }
-    sum / f64::max(n, 1.0) - 1.0
-}
-
-/// Whether the residual of a fit to several recordings is slow noise: not too large, without structure common to the recordings, without
-/// tones and without an outlier segment.
-pub(crate) fn leaves_slow_noise(f: &Fit, data: &FitData) -> bool {
-    let e = &f.residuals.residual_n;
-    data.recording_count() > 1
-        && excess(data, e) < MIN_EXCESS_SLOW
-        && outlier_segment_p_value(data, e).is_none()
-        && detect_tones(f, data).is_empty()
-        && test_residuals(f, data).coloured_noise.p_value > MIN_NOISE_P_VALUE
 }
 
 /// p-value of a tone whose power is `excess` times that of all other frequencies, in white noise (Fisher 1929).

@@ -1,5 +1,4 @@
 use super::*;
-use crate::held_out::sample_noise_sd_n;
 use crate::test_fixtures::{assumed_layers, blocks_of, fit_simulated, search_stage};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -76,7 +75,11 @@ fn result_with_held_out(bias_n: f64, with_n: impl Fn(f64, f64) -> f64) -> Option
 fn weak_cause_must_improve_held_out_predictions() {
     let reason = |share: f64| result_with_held_out(3e-3, |residual_n, noise| residual_n - share * noise);
     assert_eq!(reason(-0.1).as_deref(), Some("does not improve the prediction of held-out recordings"));
-    assert_eq!(reason(0.02), None);
+    assert_eq!(
+        reason(0.0015).as_deref(),
+        Some("changes the prediction of held-out recordings by less than 0.2 % of the noise")
+    );
+    assert_eq!((reason(0.0025), reason(0.02)), (None, None));
     // A strong cause needs no held-out gain.
     assert_eq!(result_with_held_out(0.05, |residual_n, _| 2.0 * residual_n), None);
 }

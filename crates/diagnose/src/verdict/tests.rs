@@ -1,5 +1,5 @@
 use super::*;
-use crate::test_fixtures::{blocks_of, data_of, search_result, search_stage};
+use crate::test_fixtures::{search_result, search_stage};
 use std::sync::Arc;
 use stylet_identify::model::EffectTerm;
 use stylet_tissue::{AnyEffect, Effect, ForceBias, ForceDrift, Respiration};
@@ -11,45 +11,6 @@ fn p_value_of_a_tone_follows_fisher() {
     assert!((tone_p_value(0.4, 50) / wanted - 1.0).abs() < 1e-12, "{} for {wanted}", tone_p_value(0.4, 50));
     assert_eq!(tone_p_value(0.001, 50), 1.0);
     assert_eq!(tone_p_value(9.0, 9000), f64::MIN_POSITIVE);
-}
-
-/// Recordings at constant speed, and one that stops, with given residuals in units of the noise.
-#[test]
-fn excess_is_the_normalised_mean_square_minus_one() {
-    let data = |stops: bool| {
-        let t: Vec<f64> = (0..1000).map(|k| f64::from(k) / 100.0).collect();
-        let z = t.iter().map(|t| if stops { (2e-3 * t).min(0.01) } else { 2e-3 * t }).collect();
-        data_of(vec![blocks_of(t, z, vec![0.0; 1000])], 0.5)
-    };
-    let still = data(false);
-    let n = still.recordings[0].len();
-    let e: Vec<f64> = (0..n).map(|k| 0.5 * (0.7 + (k % 5) as f64 * 0.3)).collect();
-    let used: Vec<usize> = (0..n).filter(|k| still.recordings[0].used[*k]).collect();
-    let square =
-        used.iter().map(|k| (0.7 + (k % 5) as f64 * 0.3_f64).powi(2)).sum::<f64>() / used.len() as f64;
-    assert!((excess(&still, std::slice::from_ref(&e)) - (square - 1.0)).abs() < 1e-9);
-    // Outliers count as six standard deviations.
-    let mut far = e.clone();
-    far[100] = 99.0;
-    let more = (36.0 - (2.0 * e[100]).powi(2)) / used.len() as f64;
-    assert!((excess(&still, &[far]) - (square - 1.0 + more)).abs() < 1e-9);
-    // Four blocks on both sides of a velocity jump are excluded.
-    let stopped = data(true);
-    let b = &stopped.recordings[0];
-    let jump = b.motion.jumps.first().expect("it stops");
-    let (lo, hi) = (b.block_at(jump.time_s - jump.time_sd_s), b.block_at(jump.time_s + jump.time_sd_s));
-    let with = |k: usize| {
-        let mut e = vec![0.5; n];
-        e[k] = 2.0;
-        excess(&stopped, &[e])
-    };
-    for k in [lo - 4, lo, hi, hi + 4] {
-        assert!(with(k).abs() < 1e-12, "{k}: {}", with(k));
-    }
-    for k in [lo - 5, hi + 5] {
-        assert!(with(k) > 0.01, "{k}: {}", with(k));
-    }
-    assert_eq!(excess(&still, &[]), -1.0);
 }
 
 fn drift() -> AnyEffect {
