@@ -3,7 +3,6 @@
 //! No model is used; thresholds are shares of the largest force and multiples of the noise.
 
 use stylet_record::Recording;
-use stylet_stats::order_statistics::median;
 
 /// Shortest window (s) over which a drop is measured.
 const DROP_WINDOW_S: f64 = 0.06;
@@ -15,8 +14,6 @@ const MIN_NOISE_SDS: f64 = 12.0;
 const ABRUPT_SHARE: f64 = 0.7;
 /// Largest continuation of a drop, as a share of its size over an equal time afterwards; relaxation continues by more.
 const MAX_CONTINUED_SHARE: f64 = 0.2;
-/// Motion of a needle at rest, as a share of its usual travel between two samples.
-const REST_SHARE_OF_STEP: f64 = 0.5;
 /// Smallest drop of the first layer, as a share of the largest drop; smaller ones before it are taken for unmodelled structures.
 const MIN_FIRST_RUPTURE_SHARE: f64 = 0.4;
 /// Force steps within this travel (m) during retraction are merged into one release.
@@ -98,23 +95,11 @@ fn is_abrupt(f: &[f64], after: f64) -> bool {
         && f.windows(3).map(|w| w[0] - w[2]).fold(0.0, f64::max) > ABRUPT_SHARE * fall
 }
 
-/// Samples at which the needle comes to rest for at least [`DROP_WINDOW_S`]. The friction of the advance is lost there at once.
-fn stops(recording: &Recording, phases: &InsertionPhases) -> Vec<usize> {
-    let (t, z) = (&recording.time_s, &recording.position_m);
-    let n = z.len();
-    let advance = z.get(phases.start..=phases.deepest).unwrap_or(&[]);
-    let mut steps_m: Vec<f64> = advance.windows(2).map(|p| p[1] - p[0]).filter(|dz| *dz > 0.0).collect();
-    let least_m = REST_SHARE_OF_STEP * median(&mut steps_m);
-    let rests = |k: usize| (z[window_end(t, k).min(n - 1)] - z[k]).abs() < least_m;
-    (1..n).filter(|k| rests(*k) && !rests(k - 1)).collect()
-}
-
-/// Abrupt force drops until the retraction, without those of a needle that stops: a drop at the stop is lost friction as well as a rupture.
+/// Abrupt force drops until the retraction.
 #[must_use]
 pub fn abrupt_drops(recording: &Recording, phases: &InsertionPhases) -> Vec<AbruptDrop> {
     let (t, f) = (&recording.time_s, &recording.force_n);
     let least = min_drop_n(recording);
-    let stops = stops(recording, phases);
     let mut out = Vec::new();
     let mut i = phases.start;
     loop {
@@ -122,17 +107,10 @@ pub fn abrupt_drops(recording: &Recording, phases: &InsertionPhases) -> Vec<Abru
         if j >= f.len() || i >= phases.retraction {
             return out;
         }
-        if stops.binary_search(&i).is_ok() {
-            i += 1;
-            continue;
-        }
-        // A needle that stops between two samples is at rest to within half a step at either; what follows says nothing about the advance.
-        let last = stops.get(stops.partition_point(|k| *k <= i)).map_or(f.len(), |k| *k) - 1;
-        let (j, beyond) = (j.min(last), (j + (j - i)).min(last));
-        let after = f[j] - f[beyond];
+        let after = f[j] - f[(j + (j - i)).min(f.len() - 1)];
         if f[i] - f[j] > least && is_abrupt(&f[i..=j], after) {
             let at = (i..j).max_by(|a, b| (f[*a] - f[a + 1]).total_cmp(&(f[*b] - f[b + 1]))).unwrap_or(i) + 1;
-            let end = window_end(t, at).min(last);
+            let end = window_end(t, at).min(f.len() - 1);
             let size_n = f[at.saturating_sub(4)] - f[at + (end - at).min(5)];
             out.push(AbruptDrop { sample: at, size_n });
             i = (window_end(t, window_end(t, at).min(f.len() - 1))).max(at + 1);

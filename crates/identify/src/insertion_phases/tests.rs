@@ -128,38 +128,6 @@ fn drops_have_the_time_and_size_of_the_fall() {
     assert_eq!(abrupt_drops(&recording(&up, 1e-4, 999), &whole(&r)).len(), 0);
 }
 
-/// At a stop the friction is lost, as at a rupture the elastic force.
-#[test]
-fn a_stop_is_not_a_drop_and_hides_none_before_it() {
-    // 3 mm/s at 200 Hz with 1 N of friction and a rupture at sample `ruptured`, at rest from sample 400 on.
-    let samples = |ruptured: usize| {
-        let t: Vec<f64> = (0..600).map(|k| 0.005 * f64::from(k)).collect();
-        let z: Vec<f64> = (0..600).map(|k| 15e-6 * f64::from(k.min(400))).collect();
-        let force = |k: usize| {
-            let elastic = if k < ruptured { 2e-3 * k.min(400) as f64 } else { 0.0 };
-            elastic + if k < 400 { 1.0 } else { 0.0 }
-        };
-        let f = (0..600).map(force).collect();
-        Recording::new(t, z, f).expect("a recording")
-    };
-    let found = |ruptured| -> Vec<(usize, f64)> {
-        let r = samples(ruptured);
-        abrupt_drops(&r, &detect_phases(&r)).iter().map(|d| (d.sample, d.size_n)).collect()
-    };
-    assert_eq!(found(999), [], "a stop without a rupture");
-    // A stop between two samples.
-    let mut r = samples(999);
-    r.position_m[400..].iter_mut().for_each(|z| *z -= 10e-6);
-    assert_eq!(abrupt_drops(&r, &detect_phases(&r)), []);
-    assert_eq!(found(400), [], "at the stop itself the two are not separable");
-    for ruptured in [300, 380, 390, 395, 398] {
-        let all = found(ruptured);
-        assert_eq!(all.iter().map(|d| d.0).collect::<Vec<_>>(), [ruptured]);
-        let size_n = all[0].1;
-        assert!((size_n - 2e-3 * (ruptured - 4) as f64).abs() < 1e-9, "{size_n}");
-    }
-}
-
 /// A fall that continues is not a drop.
 #[test]
 fn a_continued_fall_is_not_a_drop() {
