@@ -1,4 +1,4 @@
-//! The page of a comparison of two groups of recordings, and the texts of a transfer plan.
+//! The page of a comparison of two groups of recordings, and its sentences for the terminal.
 
 use crate::chart_model::{Chart, LineStyle, Series};
 use crate::page_model::{Cell, Page, Section, Status, Table, Tile};
