@@ -10,7 +10,7 @@
 //! A recording that is found to begin in the tissue is enhanced again without a contact; of the last kind these are the right ones, and
 //! of the others they are wrong.
 //!
-//! Columns: contact within 0.5 mm of the surface; ruptures missed and
+//! Columns: contact within 0.5 mm of the surface; surface inside the contact's 95 % interval; ruptures missed and
 //! false of all; true stiffnesses inside their 95 % intervals; median error of K.
 #![allow(clippy::print_stdout, reason = "the table")]
 
@@ -153,6 +153,8 @@ fn case(kind: &str, seed: u64) -> Case {
 struct Row {
     cases: usize,
     near: usize,
+    located: usize,
+    contacts: usize,
     ruptures: usize,
     missed: usize,
     false_alarms: usize,
@@ -179,6 +181,11 @@ fn enhanced(case: &Case, contact: Contact) -> (Vec<Output>, ContactFinding) {
 fn judge(row: &mut Row, case: &Case, outs: &[Output], loaded: bool, list: bool) {
     let contact = outs.last().and_then(|o| o.contact_m);
     let near = if case.loaded { loaded } else { !loaded && contact.is_some_and(|z| z.abs() < NEAR_M) };
+    let sd_m = outs.last().map_or(0.0, |o| o.contact_sd_m);
+    if let Some(z) = contact.filter(|_| sd_m > 0.0 && !case.loaded && !loaded) {
+        row.contacts += 1;
+        row.located += usize::from(z.abs() <= 1.96 * sd_m);
+    }
     row.cases += 1;
     row.near += usize::from(near);
     let mut found: Vec<(usize, f64)> = Vec::new();
@@ -195,8 +202,9 @@ fn judge(row: &mut Row, case: &Case, outs: &[Output], loaded: bool, list: bool) 
         }
     }
     row.zero_steps += outs.iter().filter(|o| o.zero_step.is_some()).count();
+    let mm = |m: f64| (1e5 * m).round() / 1e2;
     let mut line =
-        format!("{} {}: contact {:?}", row.cases - 1, case.what, contact.map(|z| (1e5 * z).round() / 1e2));
+        format!("{} {}: contact {:?} ± {}", row.cases - 1, case.what, contact.map(mm), mm(1.96 * sd_m));
     let mut used = vec![false; found.len()];
     let bad_before = (row.missed, row.false_alarms, row.covered + row.estimates);
     for (i, (time_s, _)) in case.ruptures.iter().enumerate() {
@@ -248,8 +256,8 @@ fn main() {
     let only = value("--kind").unwrap_or_default();
     let list = args.iter().any(|a| a == "--list");
     println!(
-        "{:10} {:>13} {:>12} {:>7} {:>7} {:>14} {:>8} {:>6}",
-        "kind", "near surface", "ruptures", "missed", "false", "K covered", "K error", "zero"
+        "{:10} {:>13} {:>14} {:>12} {:>7} {:>7} {:>14} {:>8} {:>6}",
+        "kind", "near surface", "in interval", "ruptures", "missed", "false", "K covered", "K error", "zero"
     );
     for (k, kind) in KINDS.iter().enumerate().filter(|(_, kind)| only.is_empty() || **kind == only) {
         let mut row = Row::default();
@@ -265,9 +273,11 @@ fn main() {
         }
         row.errors.sort_by(f64::total_cmp);
         println!(
-            "{kind:10} {:>5} of {:<5} {:>12} {:>7} {:>7} {:>5} of {:<5} {:>7.2}% {:>6}",
+            "{kind:10} {:>5} of {:<5} {:>5} of {:<5} {:>12} {:>7} {:>7} {:>5} of {:<5} {:>7.2}% {:>6}",
             row.near,
             row.cases,
+            row.located,
+            row.contacts,
             row.ruptures,
             row.missed,
             row.false_alarms,

@@ -10,7 +10,7 @@ use crate::config::{Contact, EnhanceConfig};
 use crate::sample::{Baseline, Sample, ZeroStep};
 
 /// Log odds at which a hypothesis is accepted: 7 to 1.
-const DECISION_NATS: f64 = 2.0;
+pub(super) const DECISION_NATS: f64 = 2.0;
 /// Log odds at which a contact is final: 20 000 to 1.
 const SETTLED_NATS: f64 = 10.0;
 
@@ -145,6 +145,9 @@ impl KalmanEnhancer {
         self.output.contact_probability = evidence.contact_probability();
         if evidence.contact_nats() > SETTLED_NATS {
             self.baseline.settled = true;
+            if evidence.onset_m.1 < self.output.contact_sd_m {
+                self.set_onset(&evidence);
+            }
         } else if evidence.contact_nats() < -DECISION_NATS {
             self.in_tissue = false;
             self.output.contact_m = None;

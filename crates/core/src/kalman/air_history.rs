@@ -21,7 +21,7 @@ use crate::sample::Sample;
 
 /// Blocks per level, and in the last level (an odd number).
 const LEVEL_BLOCKS: usize = 4;
-const LAST_LEVEL_BLOCKS: usize = 11;
+const LAST_LEVEL_BLOCKS: usize = 17;
 /// Levels, with blocks of 1, 1, 2, 4, 8 samples and, in the last one, as many as necessary.
 const LEVELS: usize = 6;
 /// Largest number of blocks, including one per level in transit.
@@ -92,6 +92,8 @@ pub(super) struct AirEvidence {
     pub(super) bend: Hypothesis,
     /// No event, with a constant offset.
     pub(super) constant_nats: f64,
+    /// A bend, with a constant offset.
+    pub(super) constant_bend_nats: f64,
     /// Posterior mean of the bend's onset in m and its standard deviation.
     pub(super) onset_m: (f64, f64),
     /// Excess of the block variance over that of the noise, 1 or more.
@@ -377,6 +379,7 @@ impl AirHistory {
                 step: Hypothesis::none(),
                 bend: Hypothesis::none(),
                 constant_nats: -0.5 * residual(Form::Constant) / excess,
+                constant_bend_nats: f64::NEG_INFINITY,
                 onset_m: (0.0, 0.0),
                 excess,
                 total,
@@ -395,6 +398,9 @@ impl AirHistory {
                 ..step[k]
             });
             out.bend.improve(Hypothesis { nats: base + bend[k].nats / excess - event, ..bend[k] });
+            if form == Form::Constant {
+                out.constant_bend_nats = out.bend.nats;
+            }
         }
         let form = usize::from(out.bend.form != Form::Constant);
         out.onset_m = self.onset_posterior(blocks, &onset_nats[form], excess);

@@ -1,5 +1,6 @@
 //! Baselines fitted to the blocks of [`super::air_history`].
 
+use super::air_decisions::DECISION_NATS;
 use super::air_history::{AirEvidence, AirHistory};
 use super::air_sums::{Form, MIN_REMAINING_SHARE, Totals};
 use crate::bounds::at_least;
@@ -57,9 +58,11 @@ impl AirHistory {
         self.fit(evidence, &evidence.total, evidence.quiet.form, at)
     }
 
-    /// The baseline of the blocks before a bend.
+    /// The baseline of the blocks before a bend. A drift or line that is not sure is fitted, but not named.
     pub(super) fn fit_before_bend(&self, evidence: &AirEvidence, at: &Sample) -> BaselineFit {
-        self.fit(evidence, &evidence.total.before(&evidence.bend.sums), evidence.bend.form, at)
+        let fit = self.fit(evidence, &evidence.total.before(&evidence.bend.sums), evidence.bend.form, at);
+        let sure = evidence.bend.nats - evidence.constant_bend_nats > DECISION_NATS;
+        BaselineFit { kind: if sure { fit.kind } else { BaselineKind::Constant }, ..fit }
     }
 
     /// The baseline behind a step, whose level is known from the samples behind it alone.

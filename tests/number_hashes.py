@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Hashes every number that the commands write, ignoring names: the same before and after a renaming.
 
-usage: tests/numbers.py STYLET [SCENARIOS]      prints one line per command: hash, how many numbers, command
+usage: tests/number_hashes.py STYLET [SCENARIOS]      prints one line per command: hash, how many numbers, command
 
 Numbers of JSON and CSV files are collected and sorted, so that neither the spelling nor the order of keys matters; times of day and
 hashes over text are left out. Run it with the binary before and the binary after, and compare the output.
