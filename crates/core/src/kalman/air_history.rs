@@ -338,15 +338,16 @@ impl AirHistory {
         let forms = [(Form::Constant, 0.0), (if line { Form::Line } else { Form::Drift }, moving)];
         let residual = |form: Form| total.residual(form);
         let (mut step, mut bend) = ([Hypothesis::none(); 2], [Hypothesis::none(); 2]);
-        // Log-likelihood of a bend at each block.
+        // Log-likelihood of a bend of any slope at each block.
         let mut onset_nats = [[f64::NEG_INFINITY; MAX_BLOCKS]; 2];
         let mut sums = Suffix::default();
         let variance = self.noise_variance();
         let least_step_n2 = MIN_STEP_SDS * MIN_STEP_SDS * variance;
         for (j, block) in blocks.iter().enumerate().skip(2).rev() {
             sums.add(block, sample_weight, &total);
-            let onset = blocks[j - 1].position_m - total.position_m;
-            let (before, jump_n) = (&blocks[j - 1], block.force_n - blocks[j - 1].force_n);
+            let before = &blocks[j - 1];
+            let onset = edge_m(before, block) - total.position_m;
+            let jump_n = block.force_n - before.force_n;
             let recent = before.count <= MAX_JUMP_SAMPLES && block.count <= MAX_JUMP_SAMPLES;
             for (k, (form, _)) in forms.iter().enumerate() {
                 if recent
@@ -361,7 +362,8 @@ impl AirHistory {
                     && size > 0.0
                     && (k == 0 || independent > MIN_INDEPENDENT)
                 {
-                    onset_nats[k][j] = 0.5 * gain;
+                    // The slope is unknown: integrated over, the likelihood is proportional to its standard deviation.
+                    onset_nats[k][j] = 0.5 * gain + libm::log(size) - 0.5 * libm::log(gain);
                     bend[k].improve(Hypothesis { form: *form, nats: 0.5 * gain, from: j, size, sums });
                 }
             }
@@ -407,19 +409,24 @@ impl AirHistory {
         out
     }
 
-    /// Mean and standard deviation of the position of a bend in m, with the log-likelihood `nats` of a bend at each block and a uniform
-    /// prior over the travel. Between two blocks the position is not resolved.
+    /// Mean and standard deviation of the position of a bend in m, with the log-likelihood `nats` of a bend at the beginning of each
+    /// block and uniform priors over travel and slope. Within a block the density is linear.
     fn onset_posterior(&self, blocks: &[Block], nats: &[f64], excess: f64) -> (f64, f64) {
         let most = nats.iter().copied().fold(f64::NEG_INFINITY, at_least);
+        let density = |nats: f64| libm::exp((nats - most) / excess);
         let (mut weight, mut mean, mut square) = (0.0, 0.0, 0.0);
-        for (pair, nats) in blocks.windows(2).zip(&nats[1..]) {
-            let cell_m = pair[1].position_m - pair[0].position_m;
-            let w = cell_m * libm::exp((nats - most) / excess);
+        for (three, nats) in blocks.windows(3).zip(nats.get(1..).unwrap_or(&[]).windows(2)) {
+            let (from_m, to_m) = (edge_m(&three[0], &three[1]), edge_m(&three[1], &three[2]));
+            let (p, q) = (density(nats[0]), density(nats[1]));
+            let (cell_m, sum) = (to_m - from_m, p + q);
+            let w = 0.5 * cell_m * sum;
             if w > 0.0 {
-                let off = pair[0].position_m - mean;
+                let share = q / sum;
+                let off = from_m + cell_m * (1.0 + share) / 3.0 - mean;
                 weight += w;
                 mean += w / weight * off;
-                square += w * (off * (pair[0].position_m - mean) + cell_m * cell_m / 12.0);
+                let within = cell_m * cell_m * (1.0 + 2.0 * share * (1.0 - share)) / 18.0;
+                square += w * (off * (off - w / weight * off) + within);
             }
         }
         let variance = if weight > 0.0 { square / weight } else { 0.0 };
@@ -457,6 +464,12 @@ impl AirHistory {
             }
         }
     }
+}
+
+/// Position in m at which one block ends and the next begins.
+fn edge_m(before: &Block, block: &Block) -> f64 {
+    let share = before.count / (before.count + block.count);
+    before.position_m + share * (block.position_m - before.position_m)
 }
 
 #[cfg(test)]
