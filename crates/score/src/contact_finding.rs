@@ -34,7 +34,7 @@ pub enum ContactHypothesis {
     LineInPosition,
     /// A drift or a line: the motion in air does not separate them.
     DriftOrLine,
-    /// The zero jumped in air.
+    /// The zero jumped in air; the baseline may move, too.
     ZeroStep,
     /// The needle is in tissue from the first sample on.
     BeginsLoaded,
@@ -79,16 +79,29 @@ pub struct ContactFinding {
 }
 
 impl ContactFinding {
+    /// A constant or moving baseline in words.
+    fn baseline_text(&self, hypothesis: ContactHypothesis) -> String {
+        let b = &self.baseline;
+        let pm = |value: f64, sd: f64, scale: f64| {
+            format!("{:.3} ± {:.2}", scale * value, scale * stylet_stats::normal::Z95 * sd)
+        };
+        let drift = pm(b.drift_n_per_s, b.sd[1], 1e3);
+        let line = pm(b.line_n_per_m, b.sd[2], 1.0);
+        match hypothesis {
+            ContactHypothesis::DriftInTime => format!("a drift of {drift} mN/s"),
+            ContactHypothesis::LineInPosition => format!("a force of {line} N/m linear in position"),
+            ContactHypothesis::DriftOrLine => {
+                format!("a drift of {drift} mN/s or a line of {line} N/m (one speed does not separate them)")
+            }
+            _ => format!("a constant offset of {:.3} N", b.offset_n + 0.0),
+        }
+    }
+
     /// The finding in one sentence, with the setting.
     #[must_use]
     pub fn sentence(&self) -> String {
         let setting = format!("--contact {}", self.setting);
         let b = &self.baseline;
-        let pm = |value: f64, sd: f64, scale: f64| {
-            format!("{:.3} ± {:.2}", scale * value, scale * stylet_stats::normal::Z95 * sd)
-        };
-        let drift = || pm(b.drift_n_per_s, b.sd[1], 1e3);
-        let line = || pm(b.line_n_per_m, b.sd[2], 1.0);
         let steps = self.zero_steps.iter().filter(|s| !s.in_tissue).count();
         let before = match self.hypothesis {
             ContactHypothesis::AtRest => return format!("the needle is at rest; no contact ({setting})"),
@@ -107,17 +120,11 @@ impl ContactFinding {
             ContactHypothesis::BeginsLoaded => {
                 return format!("the recording begins loaded, as given ({setting}); forces are absolute");
             }
-            ContactHypothesis::ConstantOffset => format!("a constant offset of {:.3} N", b.offset_n + 0.0),
-            ContactHypothesis::ZeroStep => format!("{steps} step(s) of the zero"),
-            ContactHypothesis::DriftInTime => format!("a drift of {} mN/s", drift()),
-            ContactHypothesis::LineInPosition => format!("a force of {} N/m linear in position", line()),
-            ContactHypothesis::DriftOrLine => {
-                format!(
-                    "a drift of {} mN/s or a line of {} N/m (one speed does not separate them)",
-                    drift(),
-                    line()
-                )
-            }
+            ContactHypothesis::ZeroStep => match moving_baseline(b.kind) {
+                Some(moving) => format!("{steps} step(s) of the zero and {}", self.baseline_text(moving)),
+                None => format!("{steps} step(s) of the zero"),
+            },
+            baseline => self.baseline_text(baseline),
         };
         let place = match (self.contact_m, self.contact_interval_m) {
             (Some(z), Some([low, high])) => {
@@ -150,6 +157,16 @@ impl ContactFinding {
     #[must_use]
     pub fn is_remarkable(&self) -> bool {
         self.hypothesis != ContactHypothesis::ConstantOffset || !self.zero_steps.is_empty()
+    }
+}
+
+/// The hypothesis of a moving baseline.
+fn moving_baseline(kind: BaselineKind) -> Option<ContactHypothesis> {
+    match kind {
+        BaselineKind::Constant => None,
+        BaselineKind::Drift => Some(ContactHypothesis::DriftInTime),
+        BaselineKind::Line => Some(ContactHypothesis::LineInPosition),
+        BaselineKind::DriftOrLine => Some(ContactHypothesis::DriftOrLine),
     }
 }
 
@@ -277,15 +294,10 @@ impl ContactAssessor {
     }
 
     fn baseline_hypothesis(&self) -> ContactHypothesis {
-        match self.air_baseline.kind {
-            BaselineKind::Drift => ContactHypothesis::DriftInTime,
-            BaselineKind::Line => ContactHypothesis::LineInPosition,
-            BaselineKind::DriftOrLine => ContactHypothesis::DriftOrLine,
-            BaselineKind::Constant if self.zero_steps.iter().any(|s| !s.in_tissue) => {
-                ContactHypothesis::ZeroStep
-            }
-            BaselineKind::Constant => ContactHypothesis::ConstantOffset,
+        if self.zero_steps.iter().any(|s| !s.in_tissue) {
+            return ContactHypothesis::ZeroStep;
         }
+        moving_baseline(self.air_baseline.kind).unwrap_or(ContactHypothesis::ConstantOffset)
     }
 
     /// Log odds in nats of a start in the tissue: from the errors after the contact or, without a contact, from the whitened deviations
