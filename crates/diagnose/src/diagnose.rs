@@ -159,6 +159,7 @@ pub(crate) fn diagnose_given_layers(
             .map(|c| Negligible { effect: c.effect.clone(), reason: REASON_IMITATES_UNMODELLED.to_owned() })
             .collect();
         negligible.extend(move_negligible(&mut assessment, dropped));
+        zeros.keep_strong();
     }
     let mut causes = assessment.causes;
     zeros.add_to(&mut causes);

@@ -46,8 +46,8 @@ const MIN_IMITATION_NATS: f64 = 100.0;
 const MIN_IMITATION_SLOW_NATS: f64 = 10.0;
 /// Largest relative jackknife error of a cause in the presence of an unmodelled effect.
 const MAX_RELATIVE_SE: f64 = 0.1;
-/// Smallest share of the held-out error that such a cause removes.
-const MIN_HELD_OUT_GAIN: f64 = 0.1;
+/// Smallest share of the mean square error above the noise that such a cause removes.
+pub(crate) const MIN_GAIN_BESIDE_UNKNOWN: f64 = 0.1;
 /// Largest gain of the varying-coefficient test of such a cause in the reweighted fit, as a share of the loss without it.
 const MAX_VARYING_SHARE: f64 = 0.001;
 /// Largest gain of that test in the fit with equal weights, as a share of the loss without the cause.
@@ -222,7 +222,10 @@ pub(crate) fn is_kept(
     reweighted.relative_se < MAX_RELATIVE_SE
         && reweighted.varying_coefficient_share < MAX_VARYING_SHARE.min(most)
         && unweighted.is_none_or(|l| l.varying_coefficient_share < most)
-        && [Some(reweighted), unweighted].into_iter().flatten().all(|b| b.held_out_gain > MIN_HELD_OUT_GAIN)
+        && [Some(reweighted), unweighted]
+            .into_iter()
+            .flatten()
+            .all(|b| b.held_out_gain > MIN_GAIN_BESIDE_UNKNOWN)
 }
 
 /// Moves negligible causes to the list of negligible effects.

@@ -2,8 +2,10 @@
 
 use crate::base_law_fit::{PreparedRecordings, SAME_EVENT_S};
 use crate::diagnosis_json::{Cause, Estimate};
+use crate::held_out::sample_noise_sd_n;
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, confidence, likelihood_gain};
 use crate::selection_state::Search;
+use crate::verdict::MIN_GAIN_BESIDE_UNKNOWN;
 use std::sync::Arc;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::{Effort, Fit, Linearization, fit};
@@ -183,6 +185,14 @@ impl ZeroStepReport {
         causes.extend(self.offset.take().filter(|_| !self.holds_offset));
         causes.extend(self.steps.take());
     }
+
+    /// Drops causes that remove so little of the residual that they may imitate an unmodelled force. Steps do not recur, so there is no
+    /// held-out recording that could confirm them.
+    pub(crate) fn keep_strong(&mut self) {
+        for cause in [&mut self.offset, &mut self.steps] {
+            cause.take_if(|c| c.share < MIN_GAIN_BESIDE_UNKNOWN);
+        }
+    }
 }
 
 /// Adds the half widths of `other`'s intervals to those of `cause` in quadrature.
@@ -301,8 +311,12 @@ fn cause(search: &Search, effect: &AnyEffect, half_widths: &[f64], removed: impl
     for (steps, b) in without.zero_steps.iter_mut().zip(data.recordings.iter()) {
         steps.retain(|s| !removed(s.time_s <= b.span_s().0));
     }
-    let gain_nats =
-        fit(&without, data, Effort::FULL).map_or(0.0, |f| likelihood_gain(&f, &search.best, data).value());
+    let without_steps = fit(&without, data, Effort::FULL);
+    let gain_nats = without_steps.as_ref().map_or(0.0, |f| likelihood_gain(f, &search.best, data).value());
+    let share = without_steps.map_or(0.0, |f| {
+        let (noise_n, after_n, before_n) = (sample_noise_sd_n(data), search.best.rms_n(data), f.rms_n(data));
+        (before_n * before_n - after_n * after_n) / (before_n * before_n - noise_n * noise_n).max(1e-12)
+    });
     let count = model.zero_step_count() - without.zero_step_count();
     let needed = bic_penalty(2 * count, data.compared_block_count()) + MIN_GAIN_NATS;
     let parameters = effect.info().parameters.iter().zip(effect.parameters()).zip(half_widths);
@@ -315,6 +329,7 @@ fn cause(search: &Search, effect: &AnyEffect, half_widths: &[f64], removed: impl
             .map(|((p, value), half)| (p.path.to_owned(), estimate(value, *half)))
             .collect(),
         gain_nats,
+        share: share.clamp(0.0, 1.0),
         ..Cause::default()
     }
 }
