@@ -87,6 +87,10 @@ fn run(
     let output = output.with_inputs(read);
     args.results.write_and_print(&folder, &output, || summary(&found.diagnosis))?;
     if let Some(phantom) = phantom {
+        if let Some(folder) = phantom.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            let cannot = |why| Failure::Check(format!("{}: cannot be created: {why}", folder.display()));
+            std::fs::create_dir_all(folder).map_err(cannot)?;
+        }
         write_file_atomically(phantom, text.as_bytes())?;
         if !args.results.quiet {
             crate::cli::terminal_output::print(&format!("Phantom: {}\n", phantom.display()))?;

@@ -5,6 +5,7 @@ use crate::cli::exit_codes::Failure;
 use std::fmt::Write as _;
 use stylet_api::output_folder::{check_folder, recover_parent};
 use stylet_api::prediction_files::{ModelOrigin, output_files};
+use stylet_api::transfer::model_file;
 use stylet_api::{
     Factor, Prediction, PredictionOptions, Refit, read_options, read_recordings, resource_estimate,
 };
@@ -20,17 +21,16 @@ use stylet_scenario::Scenario;
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn predict(args: &PredictArgs) -> Result<(), Failure> {
-    recover_parent(&args.model)?;
-    let model = Scenario::load(&args.model)?;
-    args.limits.check(&args.model, &resource_estimate::estimate_predict(&args.data), args.results.quiet)?;
-    let folder = args.results.output_folder(&args.model, "-prediction");
-    let read = args.results.inputs(
-        &args.model,
-        args.data.iter().chain(&args.refit_on).chain(&args.columns).chain(&args.assumed),
-    );
+    let file = model_file(&args.model);
+    recover_parent(&file)?;
+    let model = Scenario::load(&file)?;
+    args.limits.check(&file, &resource_estimate::estimate_predict(&args.data), args.results.quiet)?;
+    let folder = args.results.output_folder(&file, "-prediction");
+    let read = args
+        .results
+        .inputs(&file, args.data.iter().chain(&args.refit_on).chain(&args.columns).chain(&args.assumed));
     check_folder(&folder, "predict.json", &read)?;
-    let ModelOrigin { diagnosis, assumed } =
-        ModelOrigin::of_model_file(&args.model, args.assumed.as_deref())?;
+    let ModelOrigin { diagnosis, assumed } = ModelOrigin::of_model_file(&file, args.assumed.as_deref())?;
     let read_options = read_options(args.columns.as_deref(), args.repair)?;
     let recordings = read_recordings(&args.data, &read_options)?;
     let options = PredictionOptions {
@@ -40,7 +40,7 @@ pub fn predict(args: &PredictArgs) -> Result<(), Failure> {
     };
     let found =
         stylet_api::predict_recordings(&model, diagnosis.as_ref(), assumed.as_ref(), &options, &recordings)?;
-    let output = output_files(&model, &args.model, &found)?.with_inputs(read);
+    let output = output_files(&model, &file, &found)?.with_inputs(read);
     args.results.write_and_print(&folder, &output, || summary(&found.prediction))
 }
 

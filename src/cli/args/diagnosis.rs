@@ -19,7 +19,7 @@ use stylet_api::DiagnosisInputs;
 
 Writes report.html, diagnosis.json and extended.ron: the scenario with re-fitted parameters and the
 effects found, for `stylet run` (with --motion if the scenario says `Recorded`); with --transfer
-report.html and transfer.json. The exit code is 0 whatever the verdict, 1 when no recording touches the tissue, 2 when an input or a recording is wrong.")]
+report.html and transfer.json. The exit code is 0 whatever the verdict, 1 when the recordings as a whole are unusable, 2 when an input is wrong or a recording does not touch the tissue.")]
 pub struct DiagnoseArgs {
     /// Assumed scenario, or a data set of repeated insertions (RON). Without one the layers are those that
     /// the recordings show, as `stylet identify` finds them. With --transfer a data set, or the folder of
@@ -107,7 +107,7 @@ Writes report.html and predict.json. Noise, scatter, intervals, misfit and the f
 are taken from diagnosis.json and inputs.json in the model's folder. The band allows for another needle,
 tissue and set-up; --same narrows it. The exit code is 0 however large the error is.")]
 pub struct PredictArgs {
-    /// Model: extended.ron of a diagnosis, or any scenario (RON).
+    /// Model: folder of a diagnosis, its extended.ron, or any scenario (RON).
     pub model: PathBuf,
     /// Held-out recordings (CSV with header).
     #[arg(long, value_name = "FILE", num_args = 1.., required = true)]
