@@ -1,6 +1,6 @@
 //! Decisions in air from the evidence of [`super::air_history`]: contact, steps of the sensor's zero, form of the baseline.
 
-use super::air_history::{AirEvidence, Form};
+use super::air_history::{AirEvidence, DECISION_NATS, Form};
 use super::baseline::MIN_SAMPLES;
 use super::baseline_fit::BaselineFit;
 use super::force_predictor::MotionStep;
@@ -9,8 +9,6 @@ use crate::bounds::{at_least, at_most};
 use crate::config::{Contact, EnhanceConfig};
 use crate::sample::{Baseline, Sample, ZeroStep};
 
-/// Log odds at which a hypothesis is accepted: 7 to 1.
-pub(super) const DECISION_NATS: f64 = 2.0;
 /// Log odds at which a contact is final: 20 000 to 1.
 const SETTLED_NATS: f64 = 10.0;
 

@@ -26,6 +26,8 @@ const LAST_LEVEL_BLOCKS: usize = 17;
 const LEVELS: usize = 6;
 /// Largest number of blocks, including one per level in transit.
 const MAX_BLOCKS: usize = (LEVELS - 1) * (LEVEL_BLOCKS + 1) + LAST_LEVEL_BLOCKS + 2;
+/// Log odds at which a hypothesis is accepted: 7 to 1.
+pub(super) const DECISION_NATS: f64 = 2.0;
 /// Prior log odds against a moving baseline: 2 to 1.
 const MOVING_PRIOR_NATS: f64 = 0.7;
 /// Prior log odds against a step of the zero: 10 to 1.

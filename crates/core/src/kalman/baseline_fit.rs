@@ -1,7 +1,6 @@
 //! Baselines fitted to the blocks of [`super::air_history`].
 
-use super::air_decisions::DECISION_NATS;
-use super::air_history::{AirEvidence, AirHistory};
+use super::air_history::{AirEvidence, AirHistory, DECISION_NATS};
 use super::air_sums::{Form, MIN_REMAINING_SHARE, Totals};
 use crate::bounds::at_least;
 use crate::sample::{BaselineKind, Sample};
