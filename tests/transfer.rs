@@ -83,6 +83,13 @@ fn the_parameter_that_differs_is_named_and_no_other() {
     assert_eq!((&same["verdict"], named(&same)), (&"same".into(), vec![]), "{same}");
     assert!(terminal.starts_with("No difference"), "{terminal}");
 
+    let off_zero = scenario(1.0, 0.012).replace("robot:", "effects: [ForceBias(force_n: 0.3)], robot:");
+    let (terminal, off) = compare("zero", &off_zero);
+    assert_eq!((&off["verdict"], named(&off)), (&"same".into(), vec![]), "{off}");
+    let offset_n = off["recordings"][0]["zero_offset_n"].as_f64().expect("an offset");
+    assert!((offset_n - 0.3).abs() < 0.005 && terminal.contains("off by 0.3"), "{offset_n}: {terminal}");
+    assert!(same["recordings"][0]["zero_offset_n"].is_null(), "{same}");
+
     let (terminal, less) = compare("friction", &scenario(0.7, 0.012));
     assert_eq!((&less["verdict"], named(&less)), (&"differs".into(), vec!["friction"]), "{less}");
     let friction = &less["parameters"][2];

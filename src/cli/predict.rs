@@ -12,6 +12,7 @@ use stylet_api::{
 use stylet_report::pages::formatting::significant_or_dash;
 use stylet_report::pages::prediction::{
     group_sentence, refit_sentence, summary_sentence, training_sentence, worse_than_baseline,
+    zero_offset_sentences,
 };
 use stylet_report::significant;
 use stylet_scenario::Scenario;
@@ -73,7 +74,8 @@ pub fn varying_factors(same: &[SameArg]) -> Option<Vec<Factor>> {
 fn summary(p: &Prediction) -> String {
     let mut out = format!("{}\n{}\n", summary_sentence(p), group_sentence(p));
     let lines = refit_sentence(p).into_iter().chain(training_sentence(p)).chain(worse_than_baseline(p));
-    for line in lines {
+    let zeros = zero_offset_sentences(p.recordings.iter().map(|r| (r.name.as_str(), r.zero_offset_n)));
+    for line in lines.chain(zeros) {
         let _ = writeln!(out, "{line}");
     }
     let _ = writeln!(

@@ -361,6 +361,17 @@ impl BlockAverages {
         Self { force_n, ..self.clone() }
     }
 
+    /// The same blocks with a constant force (N) subtracted from means and samples.
+    #[must_use]
+    pub fn without_offset(&self, offset_n: f64) -> Self {
+        let less = |force_n: &[f64]| force_n.iter().map(|f| f - offset_n).collect();
+        Self {
+            force_n: less(&self.force_n),
+            sample_force_n: Arc::new(less(&self.sample_force_n)),
+            ..self.clone()
+        }
+    }
+
     /// Residuals (N) per sample for block residuals `e` (N): the sample minus the predicted block mean, interpolated linearly within the
     /// block.
     #[must_use]

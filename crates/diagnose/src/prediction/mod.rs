@@ -14,6 +14,7 @@
 //! | `transfer` | in which parameters a group differs from that which made the model |
 //! | `transfer_plan` | how many recordings of a new group its prediction needs |
 //! | `uncertainty`, `prediction_band` | draws of the next recording, and their band |
+//! | `zero_offset` | offset of the sensor's zero, which is subtracted |
 //! | `prepared`, `target`, `predicted_recording` | prediction of one recording |
 
 mod group_deviation;
@@ -30,6 +31,7 @@ mod training_summary;
 mod transfer;
 mod transfer_plan;
 mod uncertainty;
+mod zero_offset;
 
 use crate::base_law_fit::assumptions_of;
 use crate::diagnosis_json::Diagnosis;

@@ -27,6 +27,9 @@ pub struct RecordingPrediction {
     pub peak_error_n: f64,
     /// Whether it is a training recording.
     pub made_the_law: bool,
+    /// Offset of the sensor's zero in N, which was subtracted; `None` if it is negligible.
+    #[serde(default)]
+    pub zero_offset_n: Option<f64>,
     /// Surface relative to the model's in m, if it was refitted.
     pub surface_shift_m: Option<f64>,
     /// Force relative to the model's, if it was refitted.
@@ -167,6 +170,7 @@ pub fn predict_one(
         band_coverage: sums.inside / count,
         peak_error_n: peak(&b.force_n) - peak(&predicted_n),
         made_the_law: target.training_index.is_some(),
+        zero_offset_n: prepared.zero_offset_n[r],
         surface_shift_m: is_fitted(0).then_some(deviation[0]),
         force_factor: factor(1),
         friction_factor: factor(2),

@@ -4,6 +4,7 @@ use super::group_deviation::{Values, deviating_model};
 use super::insertion_course::{Curve, InsertionCourse, value_at};
 use super::training_curves::TrainingSummary;
 use super::uncertainty::{Uncertainty, free_run_force};
+use super::zero_offset::zero_offset_n;
 use crate::base_law_fit::assumptions_of;
 use crate::diagnosis_json::Diagnosis;
 use crate::input_checks::{NamedRecording, clean_recordings};
@@ -27,6 +28,8 @@ pub struct Prepared {
     pub model: Model,
     /// Noise, scatter and intervals of the diagnosis.
     pub uncertainty: Uncertainty,
+    /// Offset of the sensor's zero in N, per recording; it has been subtracted from `data`.
+    pub zero_offset_n: Vec<Option<f64>>,
 }
 
 impl Prepared {
@@ -40,13 +43,27 @@ impl Prepared {
             .map(|(r, x)| BlockAverages::new(r, x, BLOCK_S))
             .collect();
         let uncertainty = Uncertainty::new(diagnosis, &blocks);
-        let n = blocks.len();
+        let model = Model::base(Arc::new(assumptions_of(scenario)), blocks.len());
+        let data = FitData::new(Arc::new(blocks), Noise::white(uncertainty.block_n), 0.0);
+        let zero_offset_n: Vec<Option<f64>> = (0..data.recording_count())
+            .into_par_iter()
+            .map(|r| {
+                let predicted_n = free_run_force(&model, &data, r)?;
+                let surface_m = scenario.tissue.surface_m;
+                zero_offset_n(&data.recordings[r], &predicted_n, surface_m, uncertainty.floor_n)
+            })
+            .collect();
+        let zeroed = |(b, offset_n): (&BlockAverages, &Option<f64>)| match offset_n {
+            Some(offset_n) => b.without_offset(*offset_n),
+            None => b.clone(),
+        };
         Self {
             names: evidence.iter().map(|e| e.name.clone()).collect(),
             courses: ready.recordings.iter().map(InsertionCourse::new).collect(),
-            data: FitData::new(Arc::new(blocks), Noise::white(uncertainty.block_n), 0.0),
-            model: Model::base(Arc::new(assumptions_of(scenario)), n),
+            data: data.with_recordings(data.recordings.iter().zip(&zero_offset_n).map(zeroed).collect()),
+            model,
             uncertainty,
+            zero_offset_n,
         }
     }
 

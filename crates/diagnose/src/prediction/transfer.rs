@@ -68,6 +68,9 @@ pub struct RecordingTransfer {
     pub after_n: f64,
     /// Whether the model was fitted to it.
     pub made_the_law: bool,
+    /// Offset of the sensor's zero in N, which was subtracted; `None` if it is negligible.
+    #[serde(default)]
+    pub zero_offset_n: Option<f64>,
 }
 
 /// Comparison of a group of recordings with the group that made a model: `transfer.json`.
@@ -174,6 +177,7 @@ pub fn compare_groups(
                 before_n: rms_n(&[*r], [0.0; PARAMETERS])?,
                 after_n: rms_n(&[*r], group.full_mean)?,
                 made_the_law: targets[*r].training_index.is_some(),
+                zero_offset_n: prepared.zero_offset_n[*r],
             })
         })
         .collect::<Result<_, DiagnoseError>>()?;

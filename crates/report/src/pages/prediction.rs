@@ -118,6 +118,19 @@ pub fn refit_sentence(p: &Prediction) -> Option<String> {
     Some(format!("Refitted group (95 %): {}; {errors}.", parameters.join(", ")))
 }
 
+/// Sentences on recordings whose force is off zero in air, from their names and offsets (N).
+pub fn zero_offset_sentences<'a>(
+    recordings: impl IntoIterator<Item = (&'a str, Option<f64>)>,
+) -> Vec<String> {
+    let sentence = |(name, offset_n): (&str, Option<f64>)| {
+        let offset = significant(offset_n?, 3);
+        Some(format!(
+            "{name}: the force is off by {offset} N in air, as of a sensor that was not zeroed; this is subtracted."
+        ))
+    };
+    recordings.into_iter().filter_map(sentence).collect()
+}
+
 /// A sentence for each mean curve that predicts better than the model.
 #[must_use]
 pub fn worse_than_baseline(p: &Prediction) -> Vec<String> {
@@ -216,6 +229,7 @@ fn overview(found: &PredictionResult) -> Section {
         section = section.text(sentence);
     }
     let mut warnings: Vec<String> = training_sentence(p).into_iter().chain(worse_than_baseline(p)).collect();
+    warnings.extend(zero_offset_sentences(p.recordings.iter().map(|r| (r.name.as_str(), r.zero_offset_n))));
     if !p.held_out {
         warnings.push(
             "The group was fitted to the same recording, so the residual is smaller than for a new recording. With two or more \
@@ -287,6 +301,7 @@ mod tests {
             band_coverage: 0.9,
             peak_error_n: 0.0,
             made_the_law,
+            zero_offset_n: None,
             surface_shift_m: None,
             force_factor: None,
             friction_factor: None,

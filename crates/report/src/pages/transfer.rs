@@ -2,6 +2,7 @@
 
 use crate::chart_model::{Chart, LineStyle, Series};
 use crate::page_model::{Cell, Page, Section, Status, Table, Tile};
+use crate::pages::prediction::zero_offset_sentences;
 use crate::palette::Colour;
 use stylet_diagnose::prediction::{
     MAX_MISFIT_RATIO, ParameterTransfer, PredictionCurves, Refit, Transfer, TransferResult, TransferVerdict,
@@ -77,6 +78,7 @@ pub fn summary_sentence(t: &Transfer) -> String {
 #[must_use]
 pub fn warnings(t: &Transfer) -> Vec<String> {
     let mut out = Vec::new();
+    out.extend(zero_offset_sentences(t.recordings.iter().map(|r| (r.name.as_str(), r.zero_offset_n))));
     let made: Vec<&str> = t.recordings.iter().filter(|r| r.made_the_law).map(|r| r.name.as_str()).collect();
     if !made.is_empty() {
         out.push(format!("The model was fitted to {}, which hides differences.", made.join(", ")));
