@@ -211,6 +211,7 @@ fn band_edges_are_quantiles_of_draws_noise_and_misfit() {
     };
     let places = course.places(&b, course.range, 0.0);
     let prepared = Prepared {
+        zero_offset_n: vec![None],
         names: vec![String::new()],
         data: FitData::new(Arc::new(vec![b]), Noise::white(0.03), 0.0),
         courses: vec![course],
