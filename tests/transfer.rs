@@ -87,7 +87,7 @@ fn the_parameter_that_differs_is_named_and_no_other() {
     let (terminal, off) = compare("zero", &off_zero);
     assert_eq!((&off["verdict"], named(&off)), (&"same".into(), vec![]), "{off}");
     let offset_n = off["recordings"][0]["zero_offset_n"].as_f64().expect("an offset");
-    assert!((offset_n - 0.3).abs() < 0.005 && terminal.contains("off by 0.3"), "{offset_n}: {terminal}");
+    assert!((offset_n - 0.3).abs() < 0.005 && terminal.contains("off zero by 0."), "{offset_n}: {terminal}");
     assert!(same["recordings"][0]["zero_offset_n"].is_null(), "{same}");
 
     let (terminal, less) = compare("friction", &scenario(0.7, 0.012));

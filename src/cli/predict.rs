@@ -9,10 +9,9 @@ use stylet_api::transfer::model_file;
 use stylet_api::{
     Factor, Prediction, PredictionOptions, Refit, read_options, read_recordings, resource_estimate,
 };
-use stylet_report::pages::formatting::significant_or_dash;
+use stylet_report::pages::formatting::{significant_or_dash, zero_offset_sentences};
 use stylet_report::pages::prediction::{
     group_sentence, refit_sentence, summary_sentence, training_sentence, worse_than_baseline,
-    zero_offset_sentences,
 };
 use stylet_report::significant;
 use stylet_scenario::Scenario;

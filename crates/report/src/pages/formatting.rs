@@ -48,3 +48,17 @@ pub(crate) fn data_quality_table(title: &str, quality: &[DataQualityNote]) -> Ta
     let row = |q: &DataQualityNote| vec![Cell::text(q.recording.clone()), Cell::text(q.note.message.clone())];
     Table::new(title, &["recording", "remark"], quality.iter().map(row).collect())
 }
+
+/// Sentences on recordings whose force is off zero in air, from their names and offsets (N).
+#[must_use]
+pub fn zero_offset_sentences<'a>(
+    recordings: impl IntoIterator<Item = (&'a str, Option<f64>)>,
+) -> Vec<String> {
+    let sentence = |(name, offset_n): (&str, Option<f64>)| {
+        let offset = significant(offset_n?, 3);
+        Some(format!(
+            "{name}: the force is off zero by {offset} N in air, as with a sensor that was not zeroed; the offset was subtracted."
+        ))
+    };
+    recordings.into_iter().filter_map(sentence).collect()
+}

@@ -2,7 +2,7 @@
 
 use crate::chart_model::{Chart, Level, LineStyle, MarkerSet, Series, Side};
 use crate::page_model::{Cell, Page, Section, Status, Table, Tile};
-use crate::pages::formatting::{or_dash, significant_or_dash};
+use crate::pages::formatting::{or_dash, significant_or_dash, zero_offset_sentences};
 use crate::pages::transfer::difference;
 use crate::palette::Colour;
 use stylet_diagnose::prediction::{Prediction, PredictionCurves, PredictionResult, RecordingPrediction};
@@ -116,19 +116,6 @@ pub fn refit_sentence(p: &Prediction) -> Option<String> {
         })
         .collect();
     Some(format!("Refitted group (95 %): {}; {errors}.", parameters.join(", ")))
-}
-
-/// Sentences on recordings whose force is off zero in air, from their names and offsets (N).
-pub fn zero_offset_sentences<'a>(
-    recordings: impl IntoIterator<Item = (&'a str, Option<f64>)>,
-) -> Vec<String> {
-    let sentence = |(name, offset_n): (&str, Option<f64>)| {
-        let offset = significant(offset_n?, 3);
-        Some(format!(
-            "{name}: the force is off by {offset} N in air, as of a sensor that was not zeroed; this is subtracted."
-        ))
-    };
-    recordings.into_iter().filter_map(sentence).collect()
 }
 
 /// A sentence for each mean curve that predicts better than the model.

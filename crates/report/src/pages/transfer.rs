@@ -2,7 +2,7 @@
 
 use crate::chart_model::{Chart, LineStyle, Series};
 use crate::page_model::{Cell, Page, Section, Status, Table, Tile};
-use crate::pages::prediction::zero_offset_sentences;
+use crate::pages::formatting::zero_offset_sentences;
 use crate::palette::Colour;
 use stylet_diagnose::prediction::{
     MAX_MISFIT_RATIO, ParameterTransfer, PredictionCurves, Refit, Transfer, TransferResult, TransferVerdict,
