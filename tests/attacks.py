@@ -403,7 +403,7 @@ def requests_that_are_not_http():
     child, address = page()
     for data, status in [
         (b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03\r\n\r\n", "400"), (b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n", "400"),
-        (b"GET http://evil.example/ HTTP/1.1\r\n\r\n", "400"), (b"GET / HTTP/1.1\r\nHost\r\n\r\n", "400"),
+        (b"GET http://evil.example/ HTTP/1.1\r\n\r\n", "421"), (b"GET / HTTP/1.1\r\nHost\r\n\r\n", "400"),
         (b"\r\n\r\n", "400"), (b"GET /\xff HTTP/1.1\r\n\r\n", "400"), (b"OPTIONS / HTTP/1.1\r\n\r\n", "405"),
         (b"CONNECT / HTTP/1.1\r\n\r\n", "405"), (b"GET /../../etc/passwd HTTP/1.1\r\n\r\n", "404"),
         (b"GET /events/../x HTTP/1.1\r\n\r\n", "404"), (b"GET / HTTP/1.1\r\n" + b"X: y\r\n" * 3000 + b"\r\n", "431"),
