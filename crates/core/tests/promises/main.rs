@@ -9,6 +9,7 @@ mod paper_robustness;
 mod random_streams;
 mod scale_invariance;
 mod state_machine;
+mod stylet_contact;
 mod stylet_detection;
 mod stylet_differentiated_velocity;
 mod stylet_drops;
