@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use stylet_diagnose::Diagnosis;
 use stylet_report::pages::diagnosis::{
-    different_recordings, findings, general_forms, lower_limits, partial_model, recording_differences,
-    summary_sentence, undetermined_parameters,
+    different_recordings, findings, general_forms, lower_limits, partial_model, proposed_formula,
+    recording_differences, summary_sentence, undetermined_parameters,
 };
 use stylet_report::significant;
 
@@ -57,7 +57,7 @@ pub fn summary(d: &Diagnosis) -> String {
     for sentence in findings(d) {
         let _ = writeln!(out, "  {sentence}");
     }
-    if let Some(sentence) = partial_model(d) {
+    for sentence in partial_model(d).into_iter().chain(proposed_formula(d)) {
         let _ = writeln!(out, "  {sentence}");
     }
     for sentence in lower_limits(d) {

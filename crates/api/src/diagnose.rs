@@ -72,6 +72,15 @@ impl DiagnosisReport {
         }
         output.add_json(INPUTS_FILE, &inputs.with_absolute_paths())?;
         output.add("extended.ron", self.extended_ron(&file)?);
+        let proposed = &self.details.proposed_effects;
+        if !proposed.is_empty() {
+            let list = stylet_scenario::effects_to_ron(proposed).map_err(Error::internal)?;
+            let head = format!(
+                "// Formulas for what {} does not explain, to try with --effects.\n",
+                one_line(&file)
+            );
+            output.add("proposed_effects.ron", head + &list + "\n");
+        }
         Ok(output)
     }
 }

@@ -9,6 +9,7 @@ use crate::error::DiagnoseError;
 use crate::experiment_check::{check_before_fit, effects_item, parameters_item};
 use crate::fast_tone_cause::{fast_tone_cause, mark_mains, tone_mean_square_n2, without_removed_tones};
 use crate::fast_tones::{FastTone, remove_fast_tones};
+use crate::formula_proposals::propose_formulas;
 use crate::general_forms::mark_general_forms;
 use crate::held_out::{
     FreeRunResidual, JackknifeResult, held_out_residuals, jackknife_effects, pooled_rms,
@@ -36,7 +37,7 @@ use stylet_record::sensor_artefacts::SensorArtefacts;
 use stylet_record::{QualityKind, Recording};
 use stylet_scenario::Scenario;
 use stylet_stats::parallel::*;
-use stylet_tissue::Effect;
+use stylet_tissue::{AnyEffect, Effect};
 
 /// Options of a diagnosis.
 #[derive(Clone, Copy, Debug, Default)]
@@ -53,6 +54,8 @@ pub struct DiagnosisResult {
     pub diagnosis: Diagnosis,
     /// The scenario with fitted parameters and the identified effects.
     pub extended_scenario: Scenario,
+    /// The proposed formulas as custom effects.
+    pub proposed_effects: Vec<AnyEffect>,
     /// The selection of effects.
     pub search: Search,
     /// Effects that compete with each effect of the best model, in its order.
@@ -225,6 +228,7 @@ pub(crate) fn diagnose_given_layers(
         findings: Vec::new(),
         check,
         visible_effects,
+        formulas: None,
         partial,
         advice: advice(&causes, &not_identifiable, common_motion_period_s(&search.data)),
         base_parameters: assessment.base_parameters,
@@ -260,11 +264,27 @@ pub(crate) fn diagnose_given_layers(
     Ok(DiagnosisResult {
         diagnosis,
         extended_scenario,
+        proposed_effects: Vec::new(),
         search,
         competing_effects: competing,
         base_held_out,
         extended_held_out,
     })
+}
+
+impl DiagnosisResult {
+    /// Adds formulas for the residual, if the library does not explain it.
+    pub(crate) fn with_proposals(mut self, options: &Options, progress: impl FnMut(&str)) -> Self {
+        if self.diagnosis.verdict == Verdict::Unknown && !options.brief {
+            let model = reported_model(&self.search, &self.diagnosis);
+            let held_out_n = self.diagnosis.gain.rmse_after_n;
+            let found = propose_formulas(model, &self.search.data, held_out_n, progress);
+            if let Some((formulas, effects)) = found {
+                (self.diagnosis.formulas, self.proposed_effects) = (Some(formulas), effects);
+            }
+        }
+        self
+    }
 }
 
 /// Removes fast tones from recordings and divides them into blocks; returns the tones too.
@@ -382,12 +402,17 @@ fn has_cause(search: &Search, causes: &[Cause]) -> bool {
         || search.best.model.effects.iter().any(|e| causes.iter().any(|c| c.effect == e.info.id))
 }
 
+/// The model of the extended scenario.
+fn reported_model<'a>(search: &'a Search, d: &Diagnosis) -> &'a Fit {
+    let none = search.best.model.effects.is_empty() && d.verdict != Verdict::Unknown;
+    let best = none || d.partial.is_some() || has_cause(search, &d.causes);
+    if best { &search.best } else { &search.base }
+}
+
 /// The scenario with the identified effects; with an unmodelled force, with those of the partial model.
 fn extended_scenario(scenario: &Scenario, search: &Search, d: &Diagnosis) -> Scenario {
     let mut out = scenario.clone();
-    let none = search.best.model.effects.is_empty() && d.verdict != Verdict::Unknown;
-    let best = none || d.partial.is_some() || has_cause(search, &d.causes);
-    let source = if best { &search.best } else { &search.base };
+    let source = reported_model(search, d);
     out.tissue = source.model.tissue.clone();
     out.effects.extend(zero_effects(search, &d.causes));
     let in_partial = |id: &str| d.partial.as_ref().is_some_and(|p| p.effects.iter().any(|e| e == id));

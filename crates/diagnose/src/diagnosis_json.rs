@@ -352,6 +352,64 @@ pub struct PartialModel {
     pub share: f64,
 }
 
+/// A variable that the residual is a function of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CarryingVariable {
+    /// Name of the variable, as in formulas of custom effects; `path` is the length of the whole path.
+    pub variable: String,
+    /// How the function `f` of the variable enters the force.
+    pub factor: String,
+    /// Gain in nats of a piecewise linear function on recordings that were left out.
+    pub gain_nats: f64,
+}
+
+/// The residual as a function of the variable that carries most of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ResidualCurve {
+    /// Name of the variable.
+    pub variable: String,
+    /// Its unit.
+    pub unit: String,
+    /// How the function `f` enters the force.
+    pub factor: String,
+    /// Values of the variable.
+    pub x: Vec<f64>,
+    /// The function there.
+    pub value: Vec<f64>,
+    /// Lower ends of 95 % intervals (jackknife over recordings).
+    pub low: Vec<f64>,
+    /// Upper ends.
+    pub high: Vec<f64>,
+}
+
+/// A formula for the residual, to try as a custom effect.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ProposedFormula {
+    /// Name of the effect in `proposed_effects.ron`.
+    pub name: String,
+    /// The force in N.
+    pub formula: String,
+    /// The variable of the formula.
+    pub variable: String,
+    /// Fitted parameters.
+    pub parameters: BTreeMap<String, f64>,
+    /// Number of parameters.
+    pub complexity: usize,
+    /// RMS error in N on held-out recordings.
+    pub held_out_n: f64,
+}
+
+/// What is known of a force that no effect of the library explains: no verdict, but what to try.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ProposedFormulas {
+    /// Variables that the residual is a function of, largest gain first.
+    pub variables: Vec<CarryingVariable>,
+    /// The residual as a function of the first of them.
+    pub curve: ResidualCurve,
+    /// Formulas, smallest error first.
+    pub proposals: Vec<ProposedFormula>,
+}
+
 /// Kind of a [`Finding`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -412,6 +470,9 @@ pub struct Diagnosis {
     /// The best model in the presence of an unmodelled force.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub partial: Option<PartialModel>,
+    /// Formulas for an unmodelled force, to try as custom effects.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub formulas: Option<ProposedFormulas>,
     /// Identified effects, largest gain first.
     pub causes: Vec<Cause>,
     /// Parameters of the base law as fitted.

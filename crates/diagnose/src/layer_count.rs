@@ -28,10 +28,11 @@ pub fn identify(
     progress("looking for layers");
     let scenario = scenario_from_recordings(name, recordings, layers)?;
     if layers.is_some() {
-        let result = diagnose_given_layers(&scenario, recordings, options, progress)?;
-        return Ok((scenario, result));
+        let result = diagnose_given_layers(&scenario, recordings, options, &mut progress)?;
+        return Ok((scenario, result.with_proposals(options, progress)));
     }
-    diagnose_without_empty_layer(scenario, recordings, options, &mut progress)
+    let (scenario, result) = diagnose_without_empty_layer(scenario, recordings, options, &mut progress)?;
+    Ok((scenario, result.with_proposals(options, progress)))
 }
 
 /// Compares recordings with the prediction of a scenario. If findings contradict the result, and another number of layers with at most one
@@ -45,6 +46,17 @@ pub fn diagnose(
     recordings: &[NamedRecording],
     options: &Options,
     mut progress: impl FnMut(&str),
+) -> Result<DiagnosisResult, DiagnoseError> {
+    let result = diagnose_with_layers_of_data(scenario, recordings, options, &mut progress)?;
+    Ok(result.with_proposals(options, progress))
+}
+
+/// As [`diagnose`], without proposed formulas.
+fn diagnose_with_layers_of_data(
+    scenario: &Scenario,
+    recordings: &[NamedRecording],
+    options: &Options,
+    mut progress: &mut impl FnMut(&str),
 ) -> Result<DiagnosisResult, DiagnoseError> {
     let result = diagnose_given_layers(scenario, recordings, options, &mut progress)?;
     let is_contradicted = |d: &Diagnosis| {

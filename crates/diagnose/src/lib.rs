@@ -43,6 +43,7 @@ pub mod geometry_selection;
 pub mod held_out;
 mod identifiability;
 
+mod formula_proposals;
 mod input_checks;
 mod layer_count;
 mod local_minima;

@@ -76,6 +76,12 @@ impl<'a> ScoreTest<'a> {
         }
     }
 
+    /// Change of all fitted parameters, in the order of the normal matrix, that predicts a column best.
+    #[must_use]
+    pub fn parameter_change(&self, column: &JacobianColumn) -> Vec<f64> {
+        self.factor.solve(&self.linearization.products_with(column, self.data.recording_count()))
+    }
+
     /// Column of an effect with these values: the change of the prediction when it is added to the fitted model.
     #[must_use]
     pub fn effect_column(&self, term: &EffectTerm) -> Option<JacobianColumn> {

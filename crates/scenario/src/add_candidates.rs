@@ -15,6 +15,15 @@ pub fn load_effects(file: &Path) -> Result<Vec<AnyEffect>, InputError> {
     parse(&file.display().to_string(), &read_text(file)?)
 }
 
+/// The effects as the text of such a file.
+///
+/// # Errors
+/// When an effect cannot be written as RON.
+pub fn effects_to_ron(effects: &[AnyEffect]) -> Result<String, ron::Error> {
+    let pretty = ron::ser::PrettyConfig::new().struct_names(false).depth_limit(4);
+    crate::ron_dialect::ron_options().to_string_pretty(&effects, pretty)
+}
+
 impl Scenario {
     /// Adds the effects of a file to the candidates; duplicates are kept once.
     ///

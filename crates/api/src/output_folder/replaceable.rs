@@ -9,7 +9,10 @@ use std::path::{Path, PathBuf};
 const FILES: [(&str, &[&str]); 10] = [
     ("score.json", &["recording.csv", "score.json", "scenario.ron", "figure.svg", "report.html"]),
     ("enhance.json", &["enhance.json", "events.json", "figure.svg", "report.html", "enhanced.csv"]),
-    ("diagnosis.json", &["report.html", "diagnosis.json", "figure.svg", "extended.ron", "gain.svg"]),
+    (
+        "diagnosis.json",
+        &["report.html", "diagnosis.json", "figure.svg", "extended.ron", "proposed_effects.ron", "gain.svg"],
+    ),
     ("predict.json", &["report.html", "predict.json"]),
     ("transfer.json", &["report.html", "transfer.json"]),
     ("identifiability.json", &["report.html", "identifiability.json", "matrix.svg"]),

@@ -213,6 +213,7 @@ fn diagnosis(
         by_recording: Vec::new(),
         visible_effects: Vec::new(),
         partial: None,
+        formulas: None,
         causes,
         base_parameters: base_parameters(&estimates, assumed),
         parameters: Vec::new(),

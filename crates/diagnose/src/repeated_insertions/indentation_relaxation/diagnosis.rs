@@ -57,6 +57,7 @@ impl SpecimenReport {
         by_recording: Vec::new(),
         visible_effects: Vec::new(),
             partial: None,
+            formulas: None,
             negligible: Vec::new(),
             verdict: if causes.is_empty() { Verdict::None } else { Verdict::Named },
             causes,

@@ -3,13 +3,15 @@
 mod causes_tables;
 mod effect_search_steps;
 mod parameter_labels;
+mod proposed_formulas;
 mod residual_charts;
 mod summary_sentence;
 
 pub(crate) use parameter_labels::label_cell;
 pub use parameter_labels::{different_recordings, undetermined_parameters};
 pub use summary_sentence::{
-    findings, general_forms, lower_limits, partial_model, recording_differences, summary_sentence,
+    findings, general_forms, lower_limits, partial_model, proposed_formula, recording_differences,
+    summary_sentence,
 };
 
 use crate::page_model::{Page, Section, Status, Tile};
@@ -56,6 +58,7 @@ pub fn page(scenario: &Scenario, file: &str, command: String, examined: &Diagnos
         .section(negligible_effects(d))
         .section(not_identifiable(d).table(effects_table(&d.visible_effects)))
         .section(remaining_structure(d, &all))
+        .section(proposed_formulas::proposed_formulas(examined))
         .section(before_and_after(d, &all))
         .section(base_law_residual(d, examined, &all))
         .section(search_steps(d))
@@ -139,6 +142,7 @@ fn verdict(d: &Diagnosis) -> Section {
     let warnings: Vec<String> = findings(d)
         .into_iter()
         .chain(partial_model(d))
+        .chain(proposed_formula(d))
         .chain(undetermined_parameters(d))
         .chain(different_recordings(d))
         .collect();

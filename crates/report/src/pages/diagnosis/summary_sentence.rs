@@ -34,6 +34,26 @@ pub fn partial_model(d: &Diagnosis) -> Option<String> {
     ))
 }
 
+/// What an unexplained residual is a function of, and the first formula to try, in words.
+#[must_use]
+pub fn proposed_formula(d: &Diagnosis) -> Option<String> {
+    let formulas = d.formulas.as_ref()?;
+    let variable = &formulas.variables.first()?.variable;
+    Some(match formulas.proposals.first() {
+        Some(p) => format!(
+            "the residual is best described as a function of {variable}; a formula to try, {}: {} ({} N on held-out recordings; \
+             {} in proposed_effects.ron)",
+            p.name,
+            p.formula,
+            significant(p.held_out_n, 3),
+            if formulas.proposals.len() == 1 { "the only one" } else { "all" }
+        ),
+        None => format!(
+            "the residual is best described as a function of {variable}; no simple formula predicts held-out recordings better"
+        ),
+    })
+}
+
 /// Effects that these recordings cannot separate from a simpler one that is named.
 #[must_use]
 pub fn general_forms(c: &Cause) -> Option<String> {
