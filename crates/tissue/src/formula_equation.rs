@@ -52,7 +52,7 @@ pub const VARIABLES: [Variable; 12] = [
 ];
 
 /// Index of `travel`.
-pub(crate) const TRAVEL: usize = 6;
+const TRAVEL: usize = 6;
 const COUNT: usize = VARIABLES.len();
 
 /// The unit of an equation's value.
@@ -110,6 +110,10 @@ impl Equation for FormulaEquation {
         let Some(rate) = self.rates.get(index) else { return (0.0, 0.0) };
         let inputs = self.inputs(sample, parameters, states);
         rate.program().evaluate_with_derivative(&inputs, COUNT + self.parameters + index)
+    }
+
+    fn uses_travel(&self) -> bool {
+        self.value.uses(TRAVEL) || self.rates.iter().any(|r| r.uses(TRAVEL))
     }
 
     fn slopes(&self, sample: &EquationSample, parameters: &[f64]) -> (f64, f64) {
