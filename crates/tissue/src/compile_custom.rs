@@ -3,6 +3,7 @@
 use crate::custom_names::GrowingList;
 use crate::custom_text::{CustomText, Place};
 use crate::define_custom::{add_definition, defined_in_code};
+use crate::effect_info::EffectInfo;
 use crate::effects::Custom;
 use crate::equation_inputs::EquationInputs;
 use crate::formula_equation::{FormulaEquation, VARIABLES, value_unit};
@@ -52,7 +53,7 @@ impl core::error::Error for CustomError {}
 /// A text with the definition that it was compiled to.
 struct Compiled {
     text: CustomText,
-    effect: Custom,
+    info: &'static EffectInfo,
 }
 
 static COMPILED: GrowingList<Compiled> = GrowingList::new();
@@ -70,12 +71,17 @@ impl Custom {
             Some(force) => {
                 let compiled = COMPILED.find_or_add(
                     |known| known.text == shared,
-                    || compile(&shared, force).map(|effect| Compiled { text: shared.clone(), effect }),
+                    || compile(&shared, force).map(|info| Compiled { text: shared.clone(), info }),
                 )?;
-                compiled.effect.entry()
+                compiled.info
             }
             None => defined_in_code(&shared)?,
         };
+        Self::with_values_of(text, info)
+    }
+
+    /// The effect of a definition with the values of a text.
+    pub(crate) fn with_values_of(text: &CustomText, info: &'static EffectInfo) -> Result<Self, CustomError> {
         let values: Vec<f64> = text.parameters.0.iter().map(|(_, p)| p.value.unwrap_or(p.start)).collect();
         Self::with_values(info, &values)
             .ok_or_else(|| CustomError::new("parameters", "do not fit the definition"))
@@ -92,7 +98,7 @@ impl Custom {
     }
 }
 
-fn compile(text: &CustomText, force: &str) -> Result<Custom, CustomError> {
+fn compile(text: &CustomText, force: &str) -> Result<&'static EffectInfo, CustomError> {
     let EquationInputs { names, units, parameters } = EquationInputs::new(text)?;
     let value = parse("force", force, 0, &names, text.place)?;
     let mut rates = Vec::new();

@@ -23,7 +23,7 @@ pub fn known_effect_info(id: &str) -> Option<&'static EffectInfo> {
 }
 
 impl Custom {
-    /// Defines an effect whose equation is code, with the parameters at their start values.
+    /// Defines an effect whose equation is code.
     ///
     /// `text` has no `force`, and an empty equation for each state. Scenarios refer to the effect by this text, with other
     /// values of the parameters. A second definition of a name replaces the first for the texts that are read later.
@@ -31,7 +31,6 @@ impl Custom {
     /// # Errors
     /// [`CustomError`] with the field.
     pub fn define(text: &CustomText, equation: Box<dyn Equation>) -> Result<Self, CustomError> {
-        let text = text.without_values();
         if text.force.is_some() {
             return Err(CustomError::new("force", "is a formula, and the equation is code; leave one out"));
         }
@@ -39,8 +38,8 @@ impl Custom {
             let what = "is a formula, and the force is code; give both as formulas or both as code";
             return Err(CustomError::new(format!("state.{name}"), what));
         }
-        let parameters = EquationInputs::new(&text)?.parameters;
-        add_definition(&text, parameters, equation)
+        let parameters = EquationInputs::new(text)?.parameters;
+        Self::with_values_of(text, add_definition(&text.without_values(), parameters, equation)?)
     }
 }
 
@@ -49,7 +48,7 @@ pub(crate) fn add_definition(
     text: &CustomText,
     parameters: Vec<ParameterInfo>,
     equation: Box<dyn Equation>,
-) -> Result<Custom, CustomError> {
+) -> Result<&'static EffectInfo, CustomError> {
     check_vanishing(text.place, &*equation, &parameters)?;
     let id = &*text.name;
     let named = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
@@ -70,7 +69,6 @@ pub(crate) fn add_definition(
     let uses_travel = equation.uses_travel();
     let definition: &'static CustomDefinition =
         Box::leak(Box::new(CustomDefinition { text: text.clone(), uses_travel, equation }));
-    let start: Vec<f64> = parameters.iter().map(|p| p.start).collect();
     let info: &'static EffectInfo = Box::leak(Box::new(EffectInfo {
         id: static_name(id),
         equation: static_name(&equation_of(text)),
@@ -82,10 +80,7 @@ pub(crate) fn add_definition(
         parameters: parameters.leak(),
         ..EffectInfo::DEFAULTS
     }));
-    let added = DEFINED.find_or_add(|_| false, || Ok::<_, CustomError>(info));
-    added?;
-    Custom::with_values(info, &start)
-        .ok_or_else(|| CustomError::new("parameters", "do not fit the definition"))
+    DEFINED.find_or_add(|_| false, || Ok(info)).copied()
 }
 
 /// The effect in code that a text without `force` and without values refers to.
