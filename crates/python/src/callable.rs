@@ -1,5 +1,6 @@
 //! Custom effects whose equation is Python code.
 
+use crate::work::start_calling_threads;
 use crate::{StyletError, failure};
 use pyo3::exceptions::{PyArithmeticError, PyAttributeError, PyRuntimeWarning, PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -9,7 +10,8 @@ use std::ffi::CString;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use stylet::tissue::{AnyEffect, Custom, CustomText, Equation, EquationSample, Place, VARIABLES};
 
-/// Held during a call: a callable may have state that does not survive a change of thread within it.
+/// Held during a call, so that callables run one after the other, and taken before the interpreter, so that no thread waits for it
+/// with the interpreter. The engine therefore runs detached.
 static CALLS: Mutex<()> = Mutex::new(());
 
 /// What callables raised since the last report, by the name of the effect.
@@ -108,9 +110,9 @@ impl PythonEquation {
         parameters: &[f64],
         states: &[f64],
     ) -> f64 {
+        let _held = CALLS.lock().unwrap_or_else(PoisonError::into_inner);
         // An interpreter that is ending takes no calls, and nobody waits for the result.
         let result = Python::try_attach(|py| {
-            let _held = CALLS.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner);
             self.call(py, function, sample, parameters, states).unwrap_or_else(|first| {
                 raised(py).entry(self.effect.clone()).or_insert(Raised { first, calls: 0 }).calls += 1;
                 f64::NAN
@@ -184,7 +186,8 @@ pub fn define_effect(
             let equation = PythonEquation::new(&text, force, rates);
             let start: Vec<f64> = text.parameters.0.iter().map(|(_, p)| p.start).collect();
             equation.try_out(py, &start)?;
-            Custom::define(&text, Box::new(equation))
+            py.detach(start_calling_threads).map_err(failure)?;
+            py.detach(|| Custom::define(&text, Box::new(equation)))
         }
     };
     // The definition has tried samples at which the equation may have no value.

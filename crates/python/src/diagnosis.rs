@@ -114,8 +114,8 @@ pub fn check(
 ) -> PyResult<(String, String)> {
     let scenario = scenario.read()?;
     let recordings = to_recordings(&measured, columns, repair)?;
-    let found = py.detach(|| stylet::check(&scenario, &recordings)).map_err(failure);
-    let found = with_exceptions(py, found)?;
+    let found = run_in_background(py, None, move |_| stylet::check(&scenario, &recordings))?;
+    let found = with_exceptions(py, found.map_err(failure))?;
     let file = |name: &str| {
         let content =
             found.output.files().find(|(file, _)| *file == name).map_or(&[][..], |(_, bytes)| bytes);

@@ -242,12 +242,12 @@ impl Run {
     }
 
     /// The report as one HTML page.
-    fn html(&self) -> PyResult<String> {
-        Ok(self.run.report(&self.file).map_err(failure)?.to_html())
+    fn html(&self, py: Python<'_>) -> PyResult<String> {
+        py.detach(|| self.run.report(&self.file).map(|report| report.to_html())).map_err(failure)
     }
 
     /// Writes the files of `stylet run` into a folder.
-    fn write(&self, folder: PathBuf) -> PyResult<()> {
-        self.run.output(&self.file).and_then(|o| o.write(&folder)).map_err(failure)
+    fn write(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
+        py.detach(|| self.run.output(&self.file).and_then(|o| o.write(&folder))).map_err(failure)
     }
 }
