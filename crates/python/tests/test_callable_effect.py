@@ -12,6 +12,12 @@ GEL = (
     'Scenario(name: "one gel", tissue: (layers: [(thickness_m: 0.02, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]), '
     "motion: Constant(start_m: -0.004, velocity_mps: 0.008, duration_s: 2.0), robot: Replay)"
 )
+# Three speeds, few samples: a fit calls hundreds of thousands of times.
+SPEEDS = (
+    'Scenario(name: "one gel", tissue: (layers: [(thickness_m: 0.04, stiffness_n_per_m: 60.0, friction_ns_per_m2: 9000.0)]), '
+    "motion: Program(start_m: -0.005, segments: [Move(velocity_mps: 0.008, duration_s: 2.0), Move(velocity_mps: 0.003, duration_s: 1.5), "
+    "Move(velocity_mps: -0.006, duration_s: 2.0)]), robot: Replay, sample_hz: 50.0, sensor: ForceTorque(noise_n: 0.01))"
+)
 DRAG = {"q": {"start": 1e6, "unit": "N s^2/m^3", "inactive": 0.0}}
 RELAXING = {"g": {"start": 0.3, "inactive": 0.0}, "tau": {"start": 0.5, "unit": "s"}}
 
@@ -64,21 +70,20 @@ def test_a_callable_gives_the_forces_of_its_formula(formula, code, tolerance_n):
     assert np.abs(found - expected).max() < tolerance_n
 
 
-def test_a_callable_gives_the_diagnosis_of_its_formula(two_gels):
+def test_a_callable_gives_the_diagnosis_of_its_formula():
     code, formula = drag(dragging, name="twin"), drag(name="twin")
-    slow = two_gels.replace("robot: Replay", "robot: Replay, sample_hz: 50.0")
     recordings = []
     for seed in (1, 2):
-        arrays = simulated(formula, slow, seed).arrays()
+        arrays = simulated(formula, SPEEDS, seed).arrays()
         recordings.append({name: arrays[name] for name in ("time_s", "position_m", "force_n", "velocity_mps")})
     expected, found = (
-        stylet.diagnose(stylet.Scenario(slow).with_effects(candidates=[effect]), recordings, progress=False) for effect in (formula, code)
+        stylet.diagnose(stylet.Scenario(SPEEDS).with_effects(candidates=[effect]), recordings, progress=False) for effect in (formula, code)
     )
     assert [cause["effect"] for cause in expected.result["causes"]] == ["twin"]
     assert found.result == expected.result
     assert "force:" not in found.extended_ron().split('name: "twin"')[1].split("parameters")[0]
     assert np.array_equal(found.predict(recordings[0]), expected.predict(recordings[0]))
-    lights = [stylet.check(stylet.Scenario(slow).with_effects(candidates=[e]), recordings).result for e in (formula, code)]
+    lights = [stylet.check(stylet.Scenario(SPEEDS).with_effects(candidates=[e]), recordings).result for e in (formula, code)]
     assert lights[0] == lights[1]
 
 
@@ -105,16 +110,15 @@ def test_what_is_misspelt_shows_where_the_effect_is_defined():
         drag(lambda sample, p, _: 1.0)
 
 
-def test_an_exception_in_a_fit_rejects_the_values_and_is_a_warning(two_gels):
+def test_an_exception_in_a_fit_rejects_the_values_and_is_a_warning():
     def picky(sample, parameters, state):
         if abs(parameters.q) > 3e5:
             raise OverflowError("too fast")
         return dragging(sample, parameters, state)
 
-    slow = two_gels.replace("robot: Replay", "robot: Replay, sample_hz: 50.0")
-    arrays = stylet.simulate(slow, seed=1).arrays()
+    arrays = stylet.simulate(SPEEDS, seed=1).arrays()
     recording = {name: arrays[name] for name in ("time_s", "position_m", "force_n")}
-    searched = stylet.Scenario(slow).with_effects(candidates=[drag(picky, name="picky")])
+    searched = stylet.Scenario(SPEEDS).with_effects(candidates=[drag(picky, name="picky")])
     with pytest.warns(RuntimeWarning, match=r"effect `picky` raised OverflowError: too fast \(\d+ calls\); the values"):
         found = stylet.diagnose(searched, [recording], progress=False)
     assert found.result["causes"] == []

@@ -25,11 +25,14 @@ class Effect:
     >>> drag = Effect("quadratic_drag", force=lambda sample, p, state: p.q * sample.v * abs(sample.v) * sample.inserted,
     ...               parameters={"q": {"start": 1e6, "unit": "N s^2/m^3", "inactive": 0.0}})
 
-    A callable must be a pure function: the same arguments give the same result. It is called from several threads, from one
-    at a time, and must not call `stylet`. Units are not checked. It is for exploration: the time of a formula is in
-    `crates/python/speed.py`. An exception is the error of `simulate`; a fit rejects the parameter values, and a warning has the
-    first exception. Text of a scenario only names the effect: it can be read after the effect was defined, and gets the
-    definition that was the last then. Objects keep theirs.
+    A callable is for exploration: it is slower than a formula (`crates/python/callable_speed.py`), and units are not checked. It must
+    be a pure function: the same arguments give the same result. It is called by one thread at a time, not always the same, and
+    must not call `stylet`. An exception is the error of `simulate`; a fit rejects the parameter values, and a warning has the
+    first exception.
+
+    The text of a scenario only names an effect in code, and gets the definition of this name that is the last when the text is
+    read; so does a sweep, which writes and reads its scenario. `Effect`, `Scenario` and results keep their definition. Definitions
+    stay in memory until the program ends.
     """
 
     def __init__(
@@ -42,14 +45,15 @@ class Effect:
         source: str = "",
     ):
         self.name = name
-        rates = (state or {}).items()
-        text = {"name": name, "place": place, "parameters": parameters, "source": source}
-        text["state"] = {key: "" if callable(rate) else rate for key, rate in rates}
+        state = state or {}
+        rates = [rate for rate in state.values() if callable(rate)]
+        equations = {key: "" if callable(rate) else rate for key, rate in state.items()}
         code = force if callable(force) else None
-        if code is None:
+        text: dict = {"name": name, "place": place, "parameters": parameters, "state": equations, "source": source}
+        if not code:
             text["force"] = force
         self._json = json.dumps({"Custom": text})
-        self.checked = _stylet.define_effect(json.dumps(text), code, [rate for _, rate in rates if callable(rate)])
+        self.checked = _stylet.define_effect(json.dumps(text), code, rates)
         """The effect as the compiled functions take it."""
 
     def json(self) -> str:
