@@ -1,8 +1,9 @@
 //! Diagnosis of measured recordings.
 
 use crate::arrays::{Column, recording};
+use crate::callable::with_exceptions;
 use crate::failure;
-use crate::run::parse;
+use crate::run::{CheckedScenario, ScenarioSource};
 use crate::work::run_in_background;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -36,22 +37,22 @@ struct Parts {
 
 /// Compares an assumed scenario with measured recordings.
 #[pyfunction]
-#[pyo3(signature = (kind, source, measured, columns=None, repair=false, force=false, progress=None))]
+#[pyo3(signature = (scenario, measured, columns=None, repair=false, force=false, progress=None))]
 #[allow(clippy::too_many_arguments, reason = "arguments by name")]
 pub fn diagnose(
     py: Python<'_>,
-    kind: &str,
-    source: &str,
+    scenario: ScenarioSource,
     measured: Vec<Measured<'_>>,
     columns: Option<PathBuf>,
     repair: bool,
     force: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Diagnosis> {
-    let scenario = parse(kind, source)?;
+    let path = scenario.path().map(str::to_owned);
+    let scenario = scenario.read()?;
     let recordings = to_recordings(&measured, columns, repair)?;
     let options = stylet::DiagnoseOptions { force, ..stylet::DiagnoseOptions::default() };
-    let assumed = if kind == "path" { source.to_owned() } else { scenario.name.clone() };
+    let assumed = path.unwrap_or_else(|| scenario.name.clone());
     let named = assumed.clone();
     let found = run_in_background(py, progress, move |callback| {
         let mut done = 0;
@@ -66,7 +67,8 @@ pub fn diagnose(
             Ok(Parts { json, ron, html, extended: found.extended })
         })
     })?;
-    Ok(Diagnosis { found: found.map_err(failure)?, assumed })
+    let found = with_exceptions(py, found.map_err(failure))?;
+    Ok(Diagnosis { found, assumed })
 }
 
 /// Finds the layers that recordings show, and diagnoses what is left.
@@ -102,17 +104,18 @@ pub fn identify(
 
 /// What recordings can show, before a diagnosis: `check.json` and the report.
 #[pyfunction]
-#[pyo3(signature = (kind, source, measured, columns=None, repair=false))]
+#[pyo3(signature = (scenario, measured, columns=None, repair=false))]
 pub fn check(
-    kind: &str,
-    source: &str,
+    py: Python<'_>,
+    scenario: ScenarioSource,
     measured: Vec<Measured<'_>>,
     columns: Option<PathBuf>,
     repair: bool,
 ) -> PyResult<(String, String)> {
-    let scenario = parse(kind, source)?;
+    let scenario = scenario.read()?;
     let recordings = to_recordings(&measured, columns, repair)?;
-    let found = stylet::check(&scenario, &recordings).map_err(failure)?;
+    let found = run_in_background(py, None, move |_| stylet::check(&scenario, &recordings))?;
+    let found = with_exceptions(py, found.map_err(failure))?;
     let file = |name: &str| {
         let content =
             found.output.files().find(|(file, _)| *file == name).map_or(&[][..], |(_, bytes)| bytes);
@@ -165,6 +168,11 @@ impl Diagnosis {
         &self.found.ron
     }
 
+    /// The extended scenario.
+    fn extended(&self) -> PyResult<CheckedScenario> {
+        CheckedScenario::new(self.found.extended.clone())
+    }
+
     /// The report.
     fn html(&self) -> &str {
         &self.found.html
@@ -186,7 +194,9 @@ impl Diagnosis {
         velocity_mps: Option<Column<'py>>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let motion = recording(&time_s, &position_m, &time_s, velocity_mps.as_ref())?;
-        let force_n = stylet::force_along_motion(&self.found.extended, &motion).map_err(failure)?;
+        let extended = &self.found.extended;
+        let force_n = py.detach(|| stylet::force_along_motion(extended, &motion)).map_err(failure);
+        let force_n = with_exceptions(py, force_n)?;
         Ok(PyArray1::from_vec(py, force_n))
     }
 }

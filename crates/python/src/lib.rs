@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod arrays;
+mod callable;
 mod diagnosis;
 mod enhancer;
 mod plan;
@@ -31,13 +32,15 @@ mod _stylet {
     #[pymodule_export]
     use super::StyletError;
     #[pymodule_export]
+    use super::callable::{CustomEffect, define_effect};
+    #[pymodule_export]
     use super::diagnosis::{Diagnosis, check, diagnose, identify};
     #[pymodule_export]
     use super::enhancer::{Enhanced, Enhancer, Output, check_config, enhance};
     #[pymodule_export]
     use super::plan::{Plan, plan};
     #[pymodule_export]
-    use super::run::{Run, add_effects, check_scenario, load_scenario, read_csv, simulate};
+    use super::run::{CheckedScenario, Run, load_scenario, read_csv, simulate};
     #[pymodule_export]
     use super::sweep::{Sweep, sweep};
 

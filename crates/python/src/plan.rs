@@ -1,8 +1,9 @@
 //! Planning of the next insertion.
 
+use crate::callable::with_exceptions;
 use crate::diagnosis::{Measured, to_recordings};
 use crate::failure;
-use crate::run::parse;
+use crate::run::ScenarioSource;
 use crate::work::run_in_background;
 use pyo3::prelude::*;
 use std::cell::Cell;
@@ -34,17 +35,17 @@ fn limits(kind: &str, source: &str) -> PyResult<Limits> {
 #[pyo3(signature = (scenario, measured, within, read, simulated=true, progress=None))]
 pub fn plan(
     py: Python<'_>,
-    scenario: (String, String),
+    scenario: ScenarioSource,
     measured: Vec<Measured<'_>>,
     within: (String, String),
     read: (Option<PathBuf>, bool),
     simulated: bool,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Plan> {
-    let assumed = parse(&scenario.0, &scenario.1)?;
+    let assumed = scenario.read()?;
     let limits = limits(&within.0, &within.1)?;
     let recordings = to_recordings(&measured, read.0, read.1)?;
-    let name = if scenario.0 == "path" { scenario.1 } else { "scenario".to_owned() };
+    let name = scenario.path().unwrap_or("scenario").to_owned();
     let planned = run_in_background(py, progress, move |callback| {
         let done = Cell::new(0);
         let report_stage = |what: &str| {
@@ -56,7 +57,7 @@ pub fn plan(
             stylet::plan_after_recordings(assumed, &recordings, &limits, simulated, at, &report_stage)?;
         Ok(Plan { json: planned.json()?, motion: planned.motion_ron()?, html: planned.html() })
     })?;
-    planned.map_err(|e: stylet::Error| failure(e))
+    with_exceptions(py, planned.map_err(|e: stylet::Error| failure(e)))
 }
 
 #[pymethods]

@@ -1,6 +1,7 @@
 //! Simulated insertions and recordings read from files.
 
 use crate::arrays::insert_columns;
+use crate::callable::{CustomEffect, with_exceptions};
 use crate::failure;
 use crate::work::run_in_background;
 use numpy::PyArray1;
@@ -10,10 +11,9 @@ use std::path::{Path, PathBuf};
 use stylet::Scenario;
 use stylet::core::config::Model;
 use stylet::score::Trace;
-use stylet::tissue::AnyEffect;
 
 /// A scenario from a file (`"path"`), from RON text (`"ron"`) or from JSON (`"json"`, what a dict becomes).
-pub fn parse(kind: &str, source: &str) -> PyResult<Scenario> {
+fn parse(kind: &str, source: &str) -> PyResult<Scenario> {
     match kind {
         "path" => Scenario::load(Path::new(source)).map_err(failure),
         "json" => {
@@ -23,42 +23,75 @@ pub fn parse(kind: &str, source: &str) -> PyResult<Scenario> {
                 let what = text.split(" at line ").next().unwrap_or(&text).to_owned();
                 failure(format!("scenario: {what}"))
             })?;
-            scenario.check().map_err(|p| failure(format!("scenario: {}: {}", p.path, p.message)))?;
-            Ok(scenario)
+            Ok(CheckedScenario::new(scenario)?.scenario)
         }
         _ => Scenario::parse("scenario", source).map_err(failure),
     }
 }
 
-/// Checks a scenario; raises what is wrong.
-#[pyfunction]
-pub fn check_scenario(kind: &str, source: &str) -> PyResult<()> {
-    parse(kind, source).map(drop)
+/// A checked scenario. It keeps its effects, also those that text could only name.
+#[pyclass(frozen)]
+pub struct CheckedScenario {
+    scenario: Scenario,
 }
 
-/// A scenario as RON with every default written out.
-#[pyfunction]
-pub fn load_scenario(kind: &str, source: &str) -> PyResult<String> {
-    parse(kind, source)?.to_ron().map_err(failure)
+impl CheckedScenario {
+    pub fn new(scenario: Scenario) -> PyResult<Self> {
+        scenario.check().map_err(|p| failure(format!("scenario: {}: {}", p.path, p.message)))?;
+        Ok(Self { scenario })
+    }
 }
 
-/// A scenario with further effects and candidates, each as JSON.
+#[pymethods]
+impl CheckedScenario {
+    /// The scenario as RON with every default written out.
+    fn to_ron(&self) -> PyResult<String> {
+        self.scenario.to_ron().map_err(failure)
+    }
+
+    /// The scenario with further effects and candidates.
+    fn with_effects(
+        &self,
+        effects: Vec<PyRef<'_, CustomEffect>>,
+        candidates: Vec<PyRef<'_, CustomEffect>>,
+    ) -> PyResult<Self> {
+        let mut scenario = self.scenario.clone();
+        scenario.effects.extend(effects.iter().map(|e| e.effect.clone()));
+        scenario.candidates.extend(candidates.iter().map(|e| e.effect.clone()));
+        Self::new(scenario)
+    }
+}
+
+/// A scenario as the functions take it: checked, or kind and text as for [`load_scenario`].
+#[derive(FromPyObject)]
+pub enum ScenarioSource {
+    /// Read before.
+    Checked(Py<CheckedScenario>),
+    /// Kind and text.
+    Text(String, String),
+}
+
+impl ScenarioSource {
+    pub fn read(&self) -> PyResult<Scenario> {
+        match self {
+            Self::Checked(checked) => Ok(checked.get().scenario.clone()),
+            Self::Text(kind, text) => parse(kind, text),
+        }
+    }
+
+    /// The path, where it is a file.
+    pub fn path(&self) -> Option<&str> {
+        match self {
+            Self::Text(kind, path) if kind == "path" => Some(path),
+            _ => None,
+        }
+    }
+}
+
+/// Reads a scenario.
 #[pyfunction]
-pub fn add_effects(ron: &str, effects: Vec<String>, candidates: Vec<String>) -> PyResult<String> {
-    let mut scenario = parse("ron", ron)?;
-    let read = |all: Vec<String>| -> PyResult<Vec<AnyEffect>> {
-        let one = |text: String| {
-            serde_json::from_str(&text).map_err(|e| {
-                let text = e.to_string();
-                failure(text.split(" at line ").next().unwrap_or(&text).to_owned())
-            })
-        };
-        all.into_iter().map(one).collect()
-    };
-    scenario.effects.extend(read(effects)?);
-    scenario.candidates.extend(read(candidates)?);
-    scenario.check().map_err(|p| failure(format!("scenario: {}: {}", p.path, p.message)))?;
-    scenario.to_ron().map_err(failure)
+pub fn load_scenario(kind: &str, source: &str) -> PyResult<CheckedScenario> {
+    CheckedScenario::new(parse(kind, source)?)
 }
 
 /// Reads a recording: columns and notes on the quality of the data.
@@ -96,17 +129,18 @@ pub struct Run {
 
 /// Simulates a scenario, runs the core on it, scores it.
 #[pyfunction]
-#[pyo3(signature = (kind, source, seed=None, compare=false))]
-pub fn simulate(py: Python<'_>, kind: &str, source: &str, seed: Option<u64>, compare: bool) -> PyResult<Run> {
-    let mut scenario = parse(kind, source)?;
+#[pyo3(signature = (scenario, seed=None, compare=false))]
+pub fn simulate(py: Python<'_>, scenario: ScenarioSource, seed: Option<u64>, compare: bool) -> PyResult<Run> {
+    let file = scenario.path().unwrap_or("scenario.ron").to_owned();
+    let mut scenario = scenario.read()?;
     scenario.seed = seed.unwrap_or(scenario.seed);
     if compare {
         scenario.compare = vec![Model::MultiLayer, Model::KelvinVoigt];
     }
-    let file = if kind == "path" { source.to_owned() } else { "scenario.ron".to_owned() };
     let named = file.clone();
     let run = run_in_background(py, None, move |_| stylet::simulate_from(&scenario, &named))?;
-    Ok(Run { run: run.map_err(failure)?, file })
+    let run = with_exceptions(py, run.map_err(failure))?;
+    Ok(Run { run, file })
 }
 
 /// The core's outputs as columns, and its estimates, into a dict.
@@ -208,12 +242,12 @@ impl Run {
     }
 
     /// The report as one HTML page.
-    fn html(&self) -> PyResult<String> {
-        Ok(self.run.report(&self.file).map_err(failure)?.to_html())
+    fn html(&self, py: Python<'_>) -> PyResult<String> {
+        py.detach(|| self.run.report(&self.file).map(|report| report.to_html())).map_err(failure)
     }
 
     /// Writes the files of `stylet run` into a folder.
-    fn write(&self, folder: PathBuf) -> PyResult<()> {
-        self.run.output(&self.file).and_then(|o| o.write(&folder)).map_err(failure)
+    fn write(&self, py: Python<'_>, folder: PathBuf) -> PyResult<()> {
+        py.detach(|| self.run.output(&self.file).and_then(|o| o.write(&folder))).map_err(failure)
     }
 }

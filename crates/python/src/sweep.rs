@@ -1,7 +1,8 @@
 //! Sweeps: insertions with random parameters.
 
+use crate::callable::with_exceptions;
 use crate::failure;
-use crate::run::parse;
+use crate::run::ScenarioSource;
 use crate::work::run_in_background;
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -18,39 +19,38 @@ pub struct Sweep {
 
 /// Runs a sweep: a file, or a `Sweep(...)` as JSON with its scenario as a separate argument.
 #[pyfunction]
-#[pyo3(signature = (path=None, json=None, kind="ron", source="", trials=None, seed=None, progress=None))]
+#[pyo3(signature = (path=None, json=None, scenario=None, trials=None, seed=None, progress=None))]
 #[allow(clippy::too_many_arguments, reason = "keyword arguments of a Python function")]
 pub fn sweep(
     py: Python<'_>,
     path: Option<PathBuf>,
     json: Option<&str>,
-    kind: &str,
-    source: &str,
+    scenario: Option<ScenarioSource>,
     trials: Option<u64>,
     seed: Option<u64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Sweep> {
-    let sweep = match (path, json) {
-        (Some(path), None) => {
+    let sweep = match (path, json, scenario) {
+        (Some(path), None, None) => {
             stylet::Sweep::load(&path, stylet::sweep::Overrides { trials, seed }).map_err(failure)?
         }
-        (None, Some(json)) => {
+        (None, Some(json), Some(scenario)) => {
             let mut file: stylet::SweepFile =
                 serde_json::from_str(json).map_err(|e| failure(format!("sweep: {e}")))?;
             file.trials = trials.unwrap_or(file.trials);
             file.seed = seed.unwrap_or(file.seed);
-            let scenario = parse(kind, source)?;
-            stylet::Sweep::new("sweep".to_owned(), file, scenario)
+            stylet::Sweep::new("sweep".to_owned(), file, scenario.read()?)
                 .map_err(|p| failure(format!("sweep: {}: {}", p.path, p.message)))?
         }
-        _ => return Err(failure("a sweep is either a file or a dict")),
+        _ => return Err(failure("a sweep is either a file, or a dict and a scenario")),
     };
     let ran = run_in_background(py, progress, move |callback| {
         let swept = stylet::sweep(&sweep, |done| callback.report("trials", done));
         (sweep, swept)
     })?;
     let (sweep, swept) = ran;
-    let swept = swept.map_err(failure)?.ok_or_else(|| failure("the sweep was stopped"))?;
+    let swept =
+        with_exceptions(py, swept.map_err(failure))?.ok_or_else(|| failure("the sweep was stopped"))?;
     Ok(Sweep { swept, sweep })
 }
 

@@ -1,9 +1,10 @@
 //! Long work on a background thread: the interpreter stays free, Ctrl-C works, progress is reported.
 
 use pyo3::prelude::*;
-use std::sync::Mutex;
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 /// Interval between checks for Ctrl-C.
@@ -34,6 +35,33 @@ impl ProgressCallback {
     }
 }
 
+/// Process and threads of work that may call Python.
+static CALLING_THREADS: Mutex<Option<(u32, &'static ThreadPool)>> = Mutex::new(None);
+
+/// From now on, work runs on threads that the interpreter knows: to make a thread known for a call and to forget it takes longer
+/// than the call.
+pub fn start_calling_threads() -> Result<(), ThreadPoolBuildError> {
+    let mut threads = CALLING_THREADS.lock().unwrap_or_else(PoisonError::into_inner);
+    // A process that was forked has none of the threads of its parent.
+    if threads.is_none_or(|(process, _)| process != std::process::id()) {
+        let pool = ThreadPoolBuilder::new().spawn_handler(|thread| {
+            let known = || Python::attach(|py| py.detach(|| thread.run()));
+            std::thread::Builder::new().spawn(known).map(drop)
+        });
+        *threads = Some((std::process::id(), Box::leak(Box::new(pool.build()?))));
+    }
+    Ok(())
+}
+
+/// The threads, if they were started in this process or in its parent.
+fn calling_threads() -> Option<&'static ThreadPool> {
+    let started = || *CALLING_THREADS.lock().unwrap_or_else(PoisonError::into_inner);
+    started()?;
+    // Without new threads the work is only slower.
+    start_calling_threads().ok()?;
+    started().map(|(_, pool)| pool)
+}
+
 /// Runs `work` on another thread while the interpreter is free; `progress` (a callable or none) is called with a text and a count. On
 /// Ctrl-C, or when `progress` raises, the work ends at its next report and the exception is raised.
 pub fn run_in_background<T: Send + 'static>(
@@ -45,7 +73,10 @@ pub fn run_in_background<T: Send + 'static>(
     let words = Mutex::new(words);
     let stop = std::sync::Arc::new(AtomicBool::new(false));
     let callback = ProgressCallback { sender, stop: stop.clone() };
-    let thread = std::thread::spawn(move || work(&callback));
+    let thread = std::thread::spawn(move || match calling_threads() {
+        Some(pool) => pool.install(|| work(&callback)),
+        None => work(&callback),
+    });
     let outcome = loop {
         // The mutex only makes the receiver usable outside the interpreter's thread.
         let word = py.detach(|| match words.lock() {

@@ -25,8 +25,8 @@ pub enum SimulateError {
     InvalidScenario(FieldError),
     /// A custom effect gives a value that is not finite or too large.
     #[error(
-        "the force is {force_n} N at {time_s} s with {effects}: the formula has no value there, or grows without limit; change its parameters, or the \
-         formula"
+        "the force is {force_n} N at {time_s} s with {effects}: the equation has no value there, or grows without limit; change its parameters, or the \
+         equation"
     )]
     NotFinite {
         /// The force in N.

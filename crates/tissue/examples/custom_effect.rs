@@ -4,8 +4,8 @@
 
 use stylet_tissue::effect::sgn;
 use stylet_tissue::{
-    Custom, CustomDefinition, EffectInfo, Equation, EquationSample, ForceLaw, ForceLawState, ParameterInfo,
-    Place, Tissue,
+    Custom, CustomText, Equation, EquationSample, ForceLaw, ForceLawState, NamedList, ParameterText, Prior,
+    Tissue,
 };
 
 /// Dry friction with ageing: `+ c sgn(v) L (1 + travel/l)`.
@@ -19,30 +19,27 @@ impl Equation for Ageing {
     }
 }
 
-const PARAMETERS: &[ParameterInfo] = &[
-    ParameterInfo::strength("c_n_per_m", "N/m", "dry friction per metre of needle inside")
-        .search(3.0, 0.3, 30.0),
-    ParameterInfo::shape("length_m", "m", "travel after which the friction has doubled")
-        .inactive(0.02)
-        .search(0.02, 0.002, 0.2)
-        .log(),
-];
-
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let info = EffectInfo {
-        id: "ageing_friction",
-        equation: "+ c sgn(v) L (1 + travel/l)",
-        parameters: PARAMETERS,
-        ..EffectInfo::DEFAULTS
+    let c_n_per_m = ParameterText {
+        start: 3.0,
+        unit: "N/m".into(),
+        inactive: Some(0.0),
+        meaning: "dry friction per metre of needle inside".into(),
+        ..ParameterText::default()
     };
-    let definition = CustomDefinition {
-        place: Place::Friction,
-        states: 0,
-        uses_travel: true,
-        equation: Box::new(Ageing),
-        text: None,
+    let length_m = ParameterText {
+        start: 0.02,
+        unit: "m".into(),
+        prior: Some(Prior::LogNormal { median: 0.02, factor: 3.0 }),
+        meaning: "travel after which the friction has doubled".into(),
+        ..ParameterText::default()
     };
-    let effect = Custom::define(info, definition)?;
+    let text = CustomText {
+        name: "ageing_friction".into(),
+        parameters: NamedList(vec![("c_n_per_m".into(), c_n_per_m), ("length_m".into(), length_m)]),
+        ..CustomText::default()
+    };
+    let effect = Custom::define(&text, Box::new(Ageing))?;
     let law = ForceLaw::new(&Tissue::three_gels(), &[effect.into()])?;
     let mut state = ForceLawState::default();
     for k in 0..=8 {

@@ -70,7 +70,7 @@ fn twins() -> [(&'static str, CustomText); 3] {
     let text = |place, force: &str, parameters, state| CustomText {
         name: "twin".into(),
         place,
-        force: force.into(),
+        force: Some(force.into()),
         parameters: NamedList(parameters),
         state: NamedList(state),
         source: String::new(),

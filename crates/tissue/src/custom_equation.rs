@@ -1,6 +1,6 @@
 //! The equation of an effect that is not in the library: given as formulas, or by code that implements [`Equation`].
 
-use crate::custom_text::{CustomText, Place};
+use crate::custom_text::CustomText;
 use alloc::boxed::Box;
 use core::fmt::Debug;
 
@@ -9,14 +9,14 @@ pub const MAX_PARAMETERS: usize = 8;
 /// Most states of one custom effect.
 pub const MAX_STATES: usize = 2;
 
-/// One sample, as an equation gets it. Quantities that its [`Place`] does not have are zero.
+/// One sample, as an equation gets it. Quantities that its [`Place`](crate::Place) does not have are zero.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EquationSample {
     /// Time in s.
     pub time_s: f64,
     /// Time since the previous sample in s; zero at the first.
     pub dt_s: f64,
-    /// Position of the tip, or of the needle's base at [`Place::Sensor`], in m.
+    /// Position of the tip, or of the needle's base at [`Place::Sensor`](crate::Place::Sensor), in m.
     pub z_m: f64,
     /// Velocity in m/s.
     pub v_mps: f64,
@@ -43,7 +43,8 @@ pub struct EquationSample {
 ///
 /// In a fit, a result that is not finite rejects the parameter values; in a simulation it is an error.
 pub trait Equation: Debug + Send + Sync {
-    /// Force in N, or length in m at [`Place::Motion`], for parameters and states in the order of the definition.
+    /// Force in N, or length in m at [`Place::Motion`](crate::Place::Motion), for parameters and states in the order of the
+    /// definition.
     fn value(&self, sample: &EquationSample, parameters: &[f64], states: &[f64]) -> f64;
 
     /// Rate of state `index` per second, and its derivative by that state.
@@ -57,7 +58,12 @@ pub trait Equation: Debug + Send + Sync {
         (0.0, 0.0)
     }
 
-    /// At [`Place::Motion`]: derivatives of the value by time and by position.
+    /// Whether it uses [`EquationSample::travel_m`], which is zero otherwise.
+    fn uses_travel(&self) -> bool {
+        true
+    }
+
+    /// At [`Place::Motion`](crate::Place::Motion): derivatives of the value by time and by position.
     fn slopes(&self, sample: &EquationSample, parameters: &[f64]) -> (f64, f64) {
         let at = |time_s: f64, z_m: f64| {
             self.value(&EquationSample { time_s, z_m, ..*sample }, parameters, &[0.0; MAX_STATES])
@@ -67,19 +73,15 @@ pub trait Equation: Debug + Send + Sync {
     }
 }
 
-/// Place and equation of a custom effect.
+/// Text and equation of a custom effect.
 #[derive(Debug)]
 pub struct CustomDefinition {
-    /// Where it acts.
-    pub place: Place,
-    /// Number of states, at most [`MAX_STATES`].
-    pub states: usize,
+    /// The text, without values of parameters. It has no `force` where the equation is code.
+    pub text: CustomText,
     /// Whether the equation uses [`EquationSample::travel_m`].
     pub uses_travel: bool,
     /// The equation.
     pub equation: Box<dyn Equation>,
-    /// The text that it was read from.
-    pub text: Option<CustomText>,
 }
 
 /// Definitions are compared by identity.

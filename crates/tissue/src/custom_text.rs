@@ -22,6 +22,8 @@ pub enum Place {
 }
 
 /// A custom effect: formulas and parameters. [`Custom::from_text`](crate::Custom::from_text) compiles it.
+///
+/// Without `force` it names an effect whose equation is code, see [`Custom::define`](crate::Custom::define).
 #[derive(Clone, Debug, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct CustomText {
@@ -30,11 +32,12 @@ pub struct CustomText {
     /// Where it acts.
     #[cfg_attr(feature = "serde", serde(default))]
     pub place: Place,
-    /// The added force in N; at `Sensor` the force behind the tool, at `Motion` a length in m.
-    pub force: String,
+    /// The added force in N; at `Sensor` the force behind the tool, at `Motion` a length in m. None where it is code.
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "Option::is_none"))]
+    pub force: Option<String>,
     /// Parameters.
     pub parameters: NamedList<ParameterText>,
-    /// States, zero at the start, each with its equation `"dx/dt = ..."`.
+    /// States, zero at the start, each with its equation `"dx/dt = ..."`, which is empty where it is code.
     #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "NamedList::is_empty"))]
     pub state: NamedList<String>,
     /// Literature, or where it was measured.
@@ -42,8 +45,19 @@ pub struct CustomText {
     pub source: String,
 }
 
+impl CustomText {
+    /// The text without values of parameters: what all effects of a definition share.
+    pub(crate) fn without_values(&self) -> Self {
+        let mut text = self.clone();
+        for (_, parameter) in &mut text.parameters.0 {
+            parameter.value = None;
+        }
+        text
+    }
+}
+
 /// A parameter of a custom effect.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct ParameterText {
     /// Typical value: the start of a search, and the value where none is given.

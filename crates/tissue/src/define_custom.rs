@@ -1,11 +1,13 @@
 //! Definition of effects that are not in the library, and the start values of a search for them.
 
 use crate::chain_stage::ChainStage;
-use crate::custom_equation::{CustomDefinition, MAX_PARAMETERS, MAX_STATES};
-use crate::custom_names::GrowingList;
-use crate::custom_text::Place;
+use crate::compile_custom::CustomError;
+use crate::custom_equation::{CustomDefinition, Equation};
+use crate::custom_names::{GrowingList, static_name};
+use crate::custom_text::{CustomText, Place};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
 use crate::effects::{Custom, effect_info};
+use crate::equation_inputs::{EquationInputs, check_vanishing};
 use alloc::boxed::Box;
 use alloc::format;
 use alloc::string::String;
@@ -21,45 +23,128 @@ pub fn known_effect_info(id: &str) -> Option<&'static EffectInfo> {
 }
 
 impl Custom {
-    /// Defines an effect by an equation, with the parameters at their start values.
+    /// Defines an effect whose equation is code.
     ///
-    /// `info.stage` and `info.custom` are set here.
+    /// `text` has no `force`, and an empty equation for each state. Scenarios refer to the effect by this text, with other
+    /// values of the parameters. A second definition of a name replaces the first for the texts that are read later.
     ///
     /// # Errors
-    /// When the name is one of the library, when there are too many parameters or states, or when no parameter is a
-    /// strength.
-    pub fn define(info: EffectInfo, definition: CustomDefinition) -> Result<Self, String> {
-        let EffectInfo { id, parameters, .. } = info;
-        let named = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
-        if !id.starts_with(|c: char| c.is_ascii_lowercase()) || !id.chars().all(named) {
-            return Err(format!("`{id}` is no name of an effect; use small letters, digits and `_`"));
+    /// [`CustomError`] with the field.
+    pub fn define(text: &CustomText, equation: Box<dyn Equation>) -> Result<Self, CustomError> {
+        if text.force.is_some() {
+            return Err(CustomError::new("force", "is a formula, and the equation is code; leave one out"));
         }
-        if effect_info(id).is_some() {
-            return Err(format!("`{id}` is an effect of the library; use another name"));
+        if let Some((name, _)) = text.state.0.iter().find(|(_, rate)| !rate.is_empty()) {
+            let what = "is a formula, and the force is code; give both as formulas or both as code";
+            return Err(CustomError::new(format!("state.{name}"), what));
         }
-        if parameters.len() > MAX_PARAMETERS || definition.states > MAX_STATES {
-            return Err(format!("at most {MAX_PARAMETERS} parameters and {MAX_STATES} states are possible"));
-        }
-        if !parameters.iter().any(|p| p.strength) {
-            return Err(
-                "no parameter is a strength; give one an inactive value, at which the effect vanishes".into(),
-            );
-        }
-        let stage = match definition.place {
-            Place::Elastic => ChainStage::Relaxation,
-            Place::Friction => ChainStage::Friction,
-            Place::Tip => ChainStage::Tip,
-            Place::Sensor => ChainStage::Tool,
-            Place::Motion => ChainStage::Kinematics,
-        };
-        let definition: &'static CustomDefinition = Box::leak(Box::new(definition));
-        let info = EffectInfo { stage, custom: Some(definition), proposal: columns(parameters), ..info };
-        let info: &'static EffectInfo = Box::leak(Box::new(info));
-        let added = DEFINED.find_or_add(|_| false, || Ok::<_, String>(info));
-        added?;
-        let start: Vec<f64> = parameters.iter().map(|p| p.start).collect();
-        Self::with_values(info, &start).ok_or_else(|| "the definition has no equation".into())
+        let parameters = EquationInputs::new(text)?.parameters;
+        Self::with_values_of(text, add_definition(&text.without_values(), parameters, equation)?)
     }
+}
+
+/// Adds a definition; `text` has no values.
+pub(crate) fn add_definition(
+    text: &CustomText,
+    parameters: Vec<ParameterInfo>,
+    equation: Box<dyn Equation>,
+) -> Result<&'static EffectInfo, CustomError> {
+    check_vanishing(text.place, &*equation, &parameters)?;
+    let id = &*text.name;
+    let named = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+    let wrong = |what: &str| Err(CustomError::new("name", format!("`{id}` {what}")));
+    if !id.starts_with(|c: char| c.is_ascii_lowercase()) || !id.chars().all(named) {
+        return wrong("is no name of an effect; use small letters, digits and `_`");
+    }
+    if effect_info(id).is_some() {
+        return wrong("is an effect of the library; use another name");
+    }
+    let stage = match text.place {
+        Place::Elastic => ChainStage::Relaxation,
+        Place::Friction => ChainStage::Friction,
+        Place::Tip => ChainStage::Tip,
+        Place::Sensor => ChainStage::Tool,
+        Place::Motion => ChainStage::Kinematics,
+    };
+    let uses_travel = equation.uses_travel();
+    let definition: &'static CustomDefinition =
+        Box::leak(Box::new(CustomDefinition { text: text.clone(), uses_travel, equation }));
+    let info: &'static EffectInfo = Box::leak(Box::new(EffectInfo {
+        id: static_name(id),
+        equation: static_name(&equation_of(text)),
+        source: if text.source.is_empty() { "defined by the user" } else { static_name(&text.source) },
+        signature: "defined by the user",
+        stage,
+        custom: Some(definition),
+        proposal: columns(&parameters),
+        parameters: parameters.leak(),
+        ..EffectInfo::DEFAULTS
+    }));
+    DEFINED.find_or_add(|_| false, || Ok(info)).copied()
+}
+
+/// The effect in code that a text without `force` and without values refers to.
+pub(crate) fn defined_in_code(text: &CustomText) -> Result<&'static EffectInfo, CustomError> {
+    let name = &text.name;
+    let in_code = |info: &&'static EffectInfo| Some((*info, &info.custom?.text));
+    let last =
+        DEFINED.iter().filter_map(in_code).filter(|(_, t)| t.name == *name && t.force.is_none()).last();
+    let Some((info, known)) = last else {
+        let what = format!(
+            "is left out, and this program defines no effect `{name}`; give a formula, or read the scenario with the program that \
+             defines the effect"
+        );
+        return Err(CustomError::new("force", what));
+    };
+    match first_difference(text, known) {
+        None => Ok(info),
+        Some(path) => {
+            let what = format!("differs from the definition of `{name}` in this program; only values may");
+            Err(CustomError::new(path, what))
+        }
+    }
+}
+
+/// Path of the first field in which two texts without formulas differ.
+fn first_difference(text: &CustomText, known: &CustomText) -> Option<String> {
+    let names = |t: &CustomText| t.parameters.0.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    let whole = [
+        ("place", text.place == known.place),
+        ("state", text.state == known.state),
+        ("source", text.source == known.source),
+        ("parameters", names(text) == names(known)),
+    ];
+    let whole = whole.iter().find(|(_, same)| !same).map(|(field, _)| String::from(*field));
+    whole.or_else(|| {
+        text.parameters.0.iter().zip(&known.parameters.0).find_map(|((name, a), (_, b))| {
+            let fields = [
+                ("start", a.start == b.start),
+                ("prior", a.prior == b.prior),
+                ("unit", a.unit == b.unit),
+                ("inactive", a.inactive == b.inactive),
+                ("meaning", a.meaning == b.meaning),
+            ];
+            let field = fields.iter().find(|(_, same)| !same)?.0;
+            Some(format!("parameters.{name}.{field}"))
+        })
+    })
+}
+
+/// The equation for listings; code is shown as a function of the effect's name.
+fn equation_of(text: &CustomText) -> String {
+    let code = format!("{}(...)", text.name);
+    let force = text.force.as_ref().unwrap_or(&code);
+    let mut out = match text.place {
+        Place::Elastic => format!("f_K -> f_K + {force}"),
+        Place::Friction | Place::Tip => format!("+ {force}"),
+        Place::Sensor => format!("f -> {force}"),
+        Place::Motion => format!("z -> z - ({force})"),
+    };
+    for (_, equation) in text.state.0.iter().filter(|(_, equation)| !equation.is_empty()) {
+        out.push_str(", ");
+        out.push_str(equation);
+    }
+    out
 }
 
 /// Values over the search range of a shape parameter, as shares of the range.

@@ -52,12 +52,33 @@ pub const VARIABLES: [Variable; 12] = [
 ];
 
 /// Index of `travel`.
-pub(crate) const TRAVEL: usize = 6;
+const TRAVEL: usize = 6;
 const COUNT: usize = VARIABLES.len();
 
 /// The unit of an equation's value.
 pub(crate) fn value_unit(place: Place) -> Unit {
     if place == Place::Motion { Unit::METRE } else { Unit::NEWTON }
+}
+
+impl EquationSample {
+    /// The values of the [`VARIABLES`].
+    #[must_use]
+    pub fn variables(&self) -> [f64; VARIABLES.len()] {
+        [
+            self.time_s,
+            self.z_m,
+            self.v_mps,
+            self.a_mps2,
+            self.depth_m,
+            self.layer,
+            self.travel_m,
+            self.inserted_m,
+            self.elastic_n,
+            self.friction_n,
+            self.force_n,
+            self.force_n,
+        ]
+    }
 }
 
 /// An equation given as formulas of the [`VARIABLES`], then the parameters, then the states.
@@ -72,25 +93,12 @@ impl FormulaEquation {
     #[inline]
     fn inputs(
         &self,
-        s: &EquationSample,
+        sample: &EquationSample,
         parameters: &[f64],
         states: &[f64],
     ) -> [f64; COUNT + MAX_PARAMETERS + MAX_STATES] {
         let mut out = [0.0; COUNT + MAX_PARAMETERS + MAX_STATES];
-        out[..COUNT].copy_from_slice(&[
-            s.time_s,
-            s.z_m,
-            s.v_mps,
-            s.a_mps2,
-            s.depth_m,
-            s.layer,
-            s.travel_m,
-            s.inserted_m,
-            s.elastic_n,
-            s.friction_n,
-            s.force_n,
-            s.force_n,
-        ]);
+        out[..COUNT].copy_from_slice(&sample.variables());
         for (slot, value) in out.iter_mut().skip(COUNT).zip(parameters) {
             *slot = *value;
         }
@@ -110,6 +118,10 @@ impl Equation for FormulaEquation {
         let Some(rate) = self.rates.get(index) else { return (0.0, 0.0) };
         let inputs = self.inputs(sample, parameters, states);
         rate.program().evaluate_with_derivative(&inputs, COUNT + self.parameters + index)
+    }
+
+    fn uses_travel(&self) -> bool {
+        self.value.uses(TRAVEL) || self.rates.iter().any(|r| r.uses(TRAVEL))
     }
 
     fn slopes(&self, sample: &EquationSample, parameters: &[f64]) -> (f64, f64) {

@@ -34,6 +34,7 @@ mod define_custom;
 pub mod effect;
 mod effect_info;
 mod effects;
+mod equation_inputs;
 mod force;
 mod force_law;
 mod force_law_state;

@@ -16,7 +16,7 @@ fn text(
     CustomText {
         name: "mine".into(),
         place,
-        force: force.into(),
+        force: Some(force.into()),
         parameters: NamedList(parameters.iter().map(|(n, p)| ((*n).into(), p.clone())).collect()),
         state: NamedList(state.iter().map(|(n, e)| ((*n).into(), (*e).into())).collect()),
         source: String::new(),
@@ -236,18 +236,82 @@ fn an_equation_in_code_is_an_effect_like_a_formula() {
             parameters[0] * effect::sgn(sample.v_mps) * sample.inserted_m
         }
     }
-    const C: &[ParameterInfo] =
-        &[ParameterInfo::strength("c_n_per_m", "N/m", "dry friction").search(6.0, 0.1, 100.0)];
-    let info =
-        EffectInfo { id: "dry", equation: "+ c sgn(v) sum l_i", parameters: C, ..EffectInfo::DEFAULTS };
-    let definition = CustomDefinition {
-        place: Place::Friction,
-        states: 0,
-        uses_travel: false,
-        equation: Box::new(Dry),
-        text: None,
-    };
-    let effect: AnyEffect = Custom::define(info, definition).expect("a definition").into();
+    let written = text(Place::Friction, "c * sgn(v) * inserted", &[("c", strength(6.0, "N/m"))], &[]);
+    let in_code = CustomText { force: None, ..written };
+    let effect: AnyEffect = Custom::define(&in_code, Box::new(Dry)).expect("a definition").into();
     let built_in: AnyEffect = CoulombFriction { c_n_per_m: 6.0 }.into();
     assert!(worst(&recorded(&[effect]), &recorded(&[built_in])) < 1e-12);
+}
+
+/// A force of as many newtons as its parameter times the number that is compiled in.
+#[derive(Debug)]
+struct Times(f64);
+
+impl Equation for Times {
+    fn value(&self, _: &EquationSample, parameters: &[f64], _: &[f64]) -> f64 {
+        self.0 * parameters[0]
+    }
+}
+
+#[test]
+fn a_text_without_a_formula_refers_to_the_last_definition_of_its_name() {
+    let named = |name: &str, value: Option<f64>| CustomText {
+        name: name.into(),
+        parameters: NamedList(vec![("c".into(), ParameterText { value, ..strength(2.0, "N") })]),
+        ..CustomText::default()
+    };
+    let first = Custom::define(&named("times", None), Box::new(Times(1.0))).expect("a definition");
+    let read = Custom::from_text(&named("times", Some(5.0))).expect("defined");
+    assert_eq!((read.entry(), read.values()), (first.entry(), &[5.0][..]));
+    assert_eq!(read.text(), named("times", Some(5.0)), "written as it was read");
+
+    // A later definition is for later texts; the earlier effect keeps its force.
+    let second = Custom::define(&named("times", None), Box::new(Times(10.0))).expect("a definition");
+    let again = Custom::from_text(&named("times", Some(5.0))).expect("defined");
+    assert_eq!(again.entry(), second.entry());
+    let force = |effect: Custom| recorded(&[effect.into()])[0] - recorded(&[])[0];
+    assert!((force(read) - 5.0).abs() < 1e-9 && (force(again) - 50.0).abs() < 1e-9);
+
+    // A formula of the same name is another effect.
+    let formula = CustomText { force: Some("3 * c".into()), ..named("times", None) };
+    assert_ne!(Custom::from_text(&formula).expect("a formula").entry(), second.entry());
+    assert_eq!(Custom::from_text(&named("times", None)).expect("defined").entry(), second.entry());
+}
+
+#[test]
+fn a_text_without_a_formula_that_fits_no_definition_says_which_field_and_what_to_do() {
+    let c = [("c", strength(2.0, "N"))];
+    let named = |name: &str, place, c: &[(&str, ParameterText)]| CustomText {
+        name: name.into(),
+        force: None,
+        ..text(place, "", c, &[])
+    };
+    Custom::define(&named("known", Place::Friction, &c), Box::new(Times(1.0))).expect("a definition");
+    let other_unit = [("c", strength(2.0, "N/m"))];
+    for (wrong, path, says) in [
+        (
+            named("nowhere", Place::Friction, &c),
+            "force",
+            "this program defines no effect `nowhere`; give a formula",
+        ),
+        (named("known", Place::Tip, &c), "place", "differs from the definition of `known`"),
+        (named("known", Place::Friction, &[]), "parameters", "differs from the definition"),
+        (named("known", Place::Friction, &other_unit), "parameters.c.unit", "only values may"),
+    ] {
+        let error = Custom::from_text(&wrong).expect_err("an error");
+        assert_eq!(error.path, path, "{error}");
+        assert!(error.message.contains(says), "{error}");
+    }
+    // What is defined is checked like what is read.
+    let twice = CustomText { force: Some("c".into()), ..named("twice", Place::Friction, &c) };
+    let state = CustomText {
+        state: NamedList(vec![("q".into(), "dq/dt = v".into())]),
+        ..named("twice", Place::Friction, &c)
+    };
+    for (wrong, path) in
+        [(twice, "force"), (state, "state.q"), (named("twice", Place::Friction, &[]), "parameters")]
+    {
+        let error = Custom::define(&wrong, Box::new(Times(1.0))).expect_err("an error");
+        assert_eq!(error.path, path, "{error}");
+    }
 }

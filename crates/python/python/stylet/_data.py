@@ -27,6 +27,11 @@ def source(given) -> tuple[str, str]:
     raise TypeError(f"a scenario is a path, RON text or a dict, not {type(given).__name__}")
 
 
+def scenario(given):
+    """A scenario as the compiled functions take it: checked already, or kind and text."""
+    return given.checked if hasattr(given, "checked") else source(given)
+
+
 def column(values) -> np.ndarray:
     """A contiguous float64 column."""
     return np.ascontiguousarray(values, dtype=np.float64)

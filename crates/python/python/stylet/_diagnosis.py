@@ -78,7 +78,7 @@ class Diagnosis:
     @property
     def extended(self) -> Scenario:
         """The scenario with re-fitted parameters and the effects found."""
-        return Scenario(self._inner.extended_ron())
+        return Scenario(self._inner.extended())
 
     def extended_ron(self) -> str:
         """`extended.ron`, the text that the command writes."""
@@ -165,10 +165,9 @@ def diagnose(
     given, kept = recordings(measured, names)
     if not given:
         raise _stylet.StyletError("no recordings: give at least one")
-    kind, text = _data.source(assumed)
     bar = _data.Progress(True if progress is None else progress)
     try:
-        inner = _stylet.diagnose(kind, text, given, columns and os.fspath(columns), repair, force, bar)
+        inner = _stylet.diagnose(_data.scenario(assumed), given, columns and os.fspath(columns), repair, force, bar)
     finally:
         bar.close()
     return Diagnosis(inner, kept, (columns and os.fspath(columns), repair))
@@ -239,5 +238,4 @@ def check(assumed, measured, *, columns=None, repair: bool = False, names=None) 
 
     Arguments as for `diagnose`. Gives the same bytes as `stylet check`."""
     given, _ = recordings(measured, names)
-    kind, text = _data.source(assumed)
-    return Check(*_stylet.check(kind, text, given, columns and os.fspath(columns), repair))
+    return Check(*_stylet.check(_data.scenario(assumed), given, columns and os.fspath(columns), repair))

@@ -73,7 +73,7 @@ def plan(assumed, measured=(), *, limits, columns=None, repair: bool = False, si
     bar = _data.Progress(True if progress is None else progress)
     try:
         inner = _stylet.plan(
-            _data.source(assumed), given, _data.source(limits), (columns and os.fspath(columns), repair), simulated, bar
+            _data.scenario(assumed), given, _data.source(limits), (columns and os.fspath(columns), repair), simulated, bar
         )
     finally:
         bar.close()

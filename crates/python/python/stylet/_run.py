@@ -14,20 +14,24 @@ class Scenario:
     """A checked scenario: from a path, RON text or a dict (enum variants as in JSON: `{"Constant": {...}}`)."""
 
     def __init__(self, given):
-        kind, text = _data.source(given)
-        self._ron = _stylet.load_scenario(kind, text)
+        if not isinstance(given, _stylet.CheckedScenario):
+            given = _stylet.load_scenario(*_data.source(given))
+        self.checked = given
+        """The scenario as the compiled functions take it."""
 
     def to_ron(self) -> str:
         """The scenario with every default written out."""
-        return self._ron
+        return self.checked.to_ron()
+
+    def __reduce__(self):
+        return Scenario, (self.to_ron(),)
 
     def with_effects(self, effects=(), candidates=()) -> Scenario:
         """The scenario with further effects, and with further effects that a diagnosis searches for (`Effect`)."""
-        added = _stylet.add_effects(self._ron, [e.json() for e in effects], [e.json() for e in candidates])
-        return Scenario(added)
+        return Scenario(self.checked.with_effects([e.checked for e in effects], [e.checked for e in candidates]))
 
     def __repr__(self) -> str:
-        return self._ron
+        return self.to_ron()
 
 
 class Run:
@@ -117,5 +121,4 @@ def simulate(scenario, seed: int | None = None, compare: bool = False) -> Run:
     """Simulates a scenario (path, RON text, dict or `Scenario`), runs the online algorithm on it and scores the result.
 
     `seed` replaces the scenario's; `compare` runs both tissue models. Gives the same bytes as `stylet run`."""
-    kind, text = _data.source(scenario)
-    return Run(_stylet.simulate(kind, text, seed, compare))
+    return Run(_stylet.simulate(_data.scenario(scenario), seed, compare))

@@ -6,11 +6,18 @@ from numpy.typing import NDArray
 
 _Column = NDArray[np.float64]
 _Measured = str | tuple[str, _Column, _Column, _Column, _Column | None]
+_Scenario = CheckedScenario | tuple[str, str]
 _Progress = Callable[[str, int], Any] | None
 
 __version__: str
 
 class StyletError(ValueError): ...
+
+class CustomEffect: ...
+
+class CheckedScenario:
+    def to_ron(self) -> str: ...
+    def with_effects(self, effects: list[CustomEffect], candidates: list[CustomEffect]) -> CheckedScenario: ...
 
 class Run:
     @property
@@ -81,6 +88,7 @@ class Diagnosis:
     @property
     def assumed(self) -> str: ...
     def json(self) -> bytes: ...
+    def extended(self) -> CheckedScenario: ...
     def extended_ron(self) -> str: ...
     def html(self) -> str: ...
     def predict(
@@ -94,16 +102,16 @@ class Sweep:
     def inputs(self) -> list[tuple[str, str]]: ...
 
 def check_config(kind: str, source: str) -> None: ...
-def check_scenario(kind: str, source: str) -> None: ...
-def load_scenario(kind: str, source: str) -> str: ...
-def add_effects(ron: str, effects: list[str], candidates: list[str]) -> str: ...
+def load_scenario(kind: str, source: str) -> CheckedScenario: ...
+def define_effect(
+    text: str, force: Callable[..., float] | None, rates: list[Callable[..., float]]
+) -> CustomEffect: ...
 def read_csv(
     path: PathLike[str] | str, columns: PathLike[str] | str | None = None, repair: bool = False
 ) -> tuple[dict[str, _Column], list[str]]: ...
-def simulate(kind: str, source: str, seed: int | None = None, compare: bool = False) -> Run: ...
+def simulate(scenario: _Scenario, seed: int | None = None, compare: bool = False) -> Run: ...
 def check(
-    kind: str,
-    source: str,
+    scenario: _Scenario,
     measured: Sequence[_Measured],
     columns: PathLike[str] | str | None = None,
     repair: bool = False,
@@ -116,8 +124,7 @@ def identify(
     progress: _Progress = None,
 ) -> Diagnosis: ...
 def diagnose(
-    kind: str,
-    source: str,
+    scenario: _Scenario,
     measured: Sequence[_Measured],
     columns: PathLike[str] | str | None = None,
     repair: bool = False,
@@ -133,7 +140,7 @@ def enhance(
     velocity_mps: _Column | None = None,
 ) -> Enhanced: ...
 def plan(
-    scenario: tuple[str, str],
+    scenario: _Scenario,
     measured: Sequence[_Measured],
     within: tuple[str, str],
     read: tuple[PathLike[str] | str | None, bool],
@@ -143,8 +150,7 @@ def plan(
 def sweep(
     path: PathLike[str] | str | None = None,
     json: str | None = None,
-    kind: str = "ron",
-    source: str = "",
+    scenario: _Scenario | None = None,
     trials: int | None = None,
     seed: int | None = None,
     progress: _Progress = None,

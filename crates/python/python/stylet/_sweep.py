@@ -56,11 +56,10 @@ def sweep(given, scenario=None, *, trials: int | None = None, seed: int | None =
                 )
             if scenario is None:
                 raise _stylet.StyletError("a sweep given as a dict needs a second argument: sweep({...}, scenario)")
-            kind, text = _data.source(scenario)
             whole = {"scenario": "scenario.ron"} | given
-            inner = _stylet.sweep(None, json.dumps(whole), kind, text, trials, seed, bar)
+            inner = _stylet.sweep(None, json.dumps(whole), _data.scenario(scenario), trials, seed, bar)
         else:
-            inner = _stylet.sweep(Path(os.fspath(given)), None, "ron", "", trials, seed, bar)
+            inner = _stylet.sweep(Path(os.fspath(given)), None, None, trials, seed, bar)
     finally:
         bar.close()
     return Sweep(inner)

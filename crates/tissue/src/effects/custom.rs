@@ -29,6 +29,11 @@ impl Custom {
         self.info
     }
 
+    /// Text and equation.
+    pub(crate) fn definition(&self) -> &'static CustomDefinition {
+        self.definition
+    }
+
     /// The parameters, in the order of the definition.
     #[must_use]
     pub fn values(&self) -> &[f64] {
@@ -50,12 +55,13 @@ impl Custom {
             }
             sample.travel_m = memory[0].abs();
         }
+        let count = definition.text.state.0.len().min(MAX_STATES);
         let mut states = [0.0; MAX_STATES];
-        for (k, state) in states.iter_mut().enumerate().take(definition.states) {
+        for (k, state) in states.iter_mut().enumerate().take(count) {
             *state = memory[1 + 2 * k];
         }
         let before = states;
-        for k in 0..definition.states.min(MAX_STATES) {
+        for k in 0..count {
             let (rate, slope) = definition.equation.rate(k, &sample, &self.values, &before);
             // Exact for a rate that is linear in the state, with coefficients that are linear in time (exponential
             // Rosenbrock method: Hochbruck and Ostermann 2010).
@@ -120,7 +126,7 @@ impl Effect for Custom {
         strengths.all(|(p, value)| *value == p.inactive)
     }
     fn has_state(&self) -> bool {
-        self.definition.states > 0 || self.definition.uses_travel
+        !self.definition.text.state.is_empty() || self.definition.uses_travel
     }
     fn relative_motion(&self, time_s: f64, z_m: f64, v_mps: f64) -> (f64, f64) {
         let sample = EquationSample { time_s, z_m, v_mps, ..EquationSample::default() };
@@ -144,7 +150,7 @@ impl Effect for Custom {
         elastic_n + self.advance(sample, tip.dz_m, state)
     }
     fn on_rupture(&self, _released_n: f64, _z_m: f64, state: &mut EffectState) {
-        if self.definition.place == Place::Elastic {
+        if self.definition.text.place == Place::Elastic {
             state[1..5].fill(0.0);
         }
     }
