@@ -259,7 +259,8 @@ impl Default for ContactConfig {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct GuardConfig {
-    /// Travel after contact or a rupture without detection, in m.
+    /// Travel after contact or a rupture without detection, in m. `Stylet`: after contact, until the base law is confirmed; a fall by
+    /// half of the force is a rupture.
     pub blind_travel_m: f64,
     /// Time constant of the acceleration in s.
     pub acceleration_time_constant_s: f64,

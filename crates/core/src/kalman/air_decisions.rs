@@ -162,6 +162,16 @@ impl KalmanEnhancer {
         }
     }
 
+    /// True if the contact is final, or would be if it were evaluated now.
+    #[cold]
+    pub(super) fn contact_is_sure(&mut self) -> bool {
+        if !self.baseline.settled {
+            self.operations += self.baseline.history.evaluation_operations();
+            self.baseline.settled = self.baseline.history.evaluate().contact_nats() > SETTLED_NATS;
+        }
+        self.baseline.settled
+    }
+
     /// The baseline at a sample, for the output.
     pub(super) fn baseline_now(&self, sample: &Sample) -> Baseline {
         let baseline = &self.baseline;

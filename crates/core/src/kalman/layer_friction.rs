@@ -44,6 +44,14 @@ impl LayerEstimator {
         (g.x[D] - gap * g.x[B_PREV], variance * noise.variance)
     }
 
+    /// Total friction per unit of drive, including the active layer, and its standard deviation.
+    pub(super) fn friction_and_sd(&self, position_m: f64, noise: &NoiseEstimator) -> (f64, f64) {
+        let (g, x) = (&self.belief, at_least(0.0, position_m - self.start_m));
+        let passed = if self.passed_count > 0 { D } else { K_PREV };
+        let variance = g.p[passed][passed] + x * (2.0 * g.cov(B, passed) + x * g.p[B][B]);
+        (self.friction(position_m), libm::sqrt(at_least(0.0, variance) * noise.variance))
+    }
+
     /// Growth of friction with travel while the shaft enters the previous layer, in N/m.
     pub(crate) fn friction_growth(&self, drive: f64) -> f64 {
         (self.belief.x[B_PREV] * drive).abs()

@@ -20,6 +20,7 @@ mod retraction_tracker;
 mod rupture_detection;
 mod shaft_friction;
 mod state;
+mod stop;
 mod tissue_update;
 mod velocity_estimator;
 mod zero_step;

@@ -13,6 +13,8 @@ const MAX_AVERAGED_SAMPLES: f64 = 16.0;
 pub(super) const SURE_DROP_SDS: f64 = 4.0;
 /// Size of a drop in standard deviations where the base law is rejected: outside its 95 % interval.
 const LIKELY_DROP_SDS: f64 = 2.0;
+/// Smallest drop before the base law is confirmed, as a share of the largest force: the elastic share of the prior at contact.
+const UNCONFIRMED_DROP_SHARE: f64 = 0.5;
 /// Squared distance in variances within which two estimates of a drop's onset agree.
 const SAME_LINE_SDS_SQUARED: f64 = 16.0;
 /// Smallest variance of a position in m²: (1 µm)².
@@ -69,12 +71,14 @@ impl KalmanEnhancer {
 
     /// True if the candidate exceeds noise and texture.
     pub(super) fn is_rupture(&mut self, config: &EnhanceConfig) -> bool {
-        // Until the base law is confirmed, no rupture is declared in the first travel after contact.
-        if self.misfit_weight > 0.0 && self.deepest_m - self.contact_sample_m < config.guard.blind_travel_m {
-            return false;
-        }
         let Some(size) = self.candidate_size() else { return false };
         self.last_drop_n = (size.fall_n, size.sd_n);
+        if self.misfit_weight > 0.0 && self.deepest_m - self.contact_sample_m < config.guard.blind_travel_m {
+            // Small falls are texture, or the contact is wrong.
+            return size.fall_n >= at_least(size.min_n, UNCONFIRMED_DROP_SHARE * self.peak_force_n)
+                && self.snapshot.layer_confirmed
+                && self.contact_is_sure();
+        }
         size.fall_n >= size.min_n
     }
 

@@ -65,6 +65,8 @@ pub(crate) struct KalmanEnhancer {
     pub(super) deferred: bool,
     /// Position in m of an alarm that was not declared because the needle may have stopped there.
     pub(super) waiting_from_m: Option<f64>,
+    /// The needle does not advance.
+    pub(super) stop: Option<Stop>,
     /// Samples since the last rupture, and the count at which the ruptured layer is reported next.
     pub(super) samples_since_rupture: u32,
     pub(super) next_report_at: u32,
@@ -99,6 +101,15 @@ pub(crate) struct KalmanEnhancer {
     /// Multiplications and additions of the last sample.
     pub(super) operations: u32,
     pub(super) output: Output,
+}
+
+/// A stop of the needle, or a retraction.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stop {
+    /// Time since the needle last advanced, in s.
+    pub(super) duration_s: f64,
+    /// Lowest force in N that the loss of friction may leave.
+    pub(super) lowest_n: f64,
 }
 
 /// A drop of the force that may be a rupture.
@@ -149,6 +160,7 @@ impl KalmanEnhancer {
             rival: None,
             deferred: false,
             waiting_from_m: None,
+            stop: None,
             samples_since_rupture: 0,
             next_report_at: u32::MAX,
             post_rupture: None,

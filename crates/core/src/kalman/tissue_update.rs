@@ -12,7 +12,7 @@ use crate::config::EnhanceConfig;
 use crate::sample::Sample;
 
 /// Standard deviations beyond which an isolated force is a spike, and the longest spike in samples.
-const SPIKE_SDS: f64 = 6.0;
+pub(super) const SPIKE_SDS: f64 = 6.0;
 const MAX_SPIKE_SAMPLES: u8 = 3;
 /// Multiplications and additions of the predictor: five shears, an innovation and an update of five unknowns.
 const OPERATIONS_PER_PREDICTION: u32 = 5 * 14 + 2 * 24 + 2 * 20;
@@ -30,6 +30,7 @@ impl KalmanEnhancer {
     pub(super) fn update_in_tissue(&mut self, config: &EnhanceConfig, step: &MotionStep, sample: &Sample) {
         let force_n = sample.force_n;
         self.restart_if_invalid(config, step, sample);
+        self.update_stop(step, sample);
         self.estimator.elapsed_s += step.dt_s;
         self.operations += OPERATIONS_PER_PREDICTION;
         self.predictor.advance(step, &self.noise);
@@ -99,7 +100,10 @@ impl KalmanEnhancer {
             self.candidate = None;
         }
         let far = innovation.e * innovation.e > SPIKE_SDS * SPIKE_SDS * self.noise.marginal_variance();
-        self.deferred = self.velocity_estimator.uses_positions() && far && !self.deferred;
+        self.deferred = self.velocity_estimator.uses_positions()
+            && far
+            && !self.deferred
+            && self.waiting_from_m.is_none();
         if self.deferred {
             // The next sample shows whether the velocity has jumped within this step.
             self.skip_sample();
@@ -113,6 +117,12 @@ impl KalmanEnhancer {
                 return;
             }
             if self.is_rupture(config) {
+                if self.is_late_friction(sample) {
+                    self.predictor.reset_level(force_n, &self.noise);
+                    self.estimator.skip_sample();
+                    self.reset_detector();
+                    return;
+                }
                 if config.stylet.derived_velocity && self.may_be_a_stop(sample, waiting_from_m) {
                     self.waiting_from_m = waiting_from_m.or(Some(sample.position_m));
                     self.skip_sample();
@@ -123,7 +133,10 @@ impl KalmanEnhancer {
             }
         }
         if !outlier {
-            self.noise.update_in_tissue(innovation.e, innovation.s);
+            // The innovations of an event are not noise.
+            if !outcome.alarm && self.post_rupture.is_none() {
+                self.noise.update_in_tissue(innovation.e, innovation.s);
+            }
             self.predictor.update(&innovation, force_n);
             self.roughness += travel_gain * (at_most(MAX_SQUARED_PREDICTION_ERROR, z * z) - self.roughness);
         }
@@ -184,7 +197,9 @@ impl KalmanEnhancer {
             );
             self.operations += operations;
             if bent {
-                // The bend explains the innovations accumulated so far.
+                // The bend explains the innovations accumulated so far; the new layer has not seen this sample.
+                self.estimator.update(position_m, drive, force_n, step.rho);
+                self.operations += OPERATIONS_PER_LAYER_INNOVATION + OPERATIONS_PER_LAYER_UPDATE;
                 self.reset_detector();
             }
         }
@@ -213,19 +228,6 @@ impl KalmanEnhancer {
     fn is_below_ruptures(&self, sample: &Sample) -> bool {
         let margin_n = SPIKE_SDS * libm::sqrt(self.noise.marginal_variance());
         sample.force_n - self.lowest_after_rupture_n(sample.position_m) < -margin_n
-    }
-
-    /// True if the needle may have stopped: the force has dropped by no more than the shaft friction, and no position since
-    /// `waiting_from_m` shows further motion.
-    #[cold]
-    fn may_be_a_stop(&self, sample: &Sample, waiting_from_m: Option<f64>) -> bool {
-        let shown_m = 2.0 * self.velocity_estimator.encoder_step_m();
-        if waiting_from_m.is_some_and(|from_m| sample.position_m - from_m > shown_m) {
-            return false;
-        }
-        let friction_n = self.snapshot.friction(sample.position_m) * self.friction_drive_mps;
-        let margin_n = SPIKE_SDS * libm::sqrt(self.noise.marginal_variance());
-        self.last_drop_n.0 < friction_n + margin_n
     }
 
     #[inline(always)]

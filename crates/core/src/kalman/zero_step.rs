@@ -5,7 +5,7 @@
 
 use super::air_history::MIN_JUMP_SHARE;
 use super::layer_estimator::{BIAS, LayerEstimator};
-use super::state::{KalmanEnhancer, MAX_ALARM_MISFIT, OPERATIONS_PER_RUPTURE};
+use super::state::{KalmanEnhancer, MAX_ALARM_MISFIT, MAX_DROP_DURATION_S, OPERATIONS_PER_RUPTURE};
 use super::zero_step_state::{Jump, Rival};
 use crate::bounds::{at_least, at_most};
 use crate::sample::{Sample, ZeroStep};
@@ -153,7 +153,8 @@ impl KalmanEnhancer {
         // Stiffness and friction are not negative.
         let nats = rival.nats + rival.rupture.negative_nats(&self.noise)
             - rival.estimator.negative_nats(&self.noise);
-        if nats > ACCEPTED_NATS {
+        // While an ordinary drop may continue, its first part looks like a step.
+        if nats > ACCEPTED_NATS && self.time_since_rupture_s > MAX_DROP_DURATION_S {
             self.withdraw_rupture();
             return true;
         }
@@ -215,3 +216,6 @@ impl KalmanEnhancer {
 
 /// Multiplications and additions of a sample of the rival.
 const RIVAL_OPERATIONS: u32 = 2 * (2 * 56 + 2 * 44) + 40;
+
+#[cfg(test)]
+mod tests;

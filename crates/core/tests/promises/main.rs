@@ -16,6 +16,7 @@ mod stylet_drops;
 mod stylet_dry_friction;
 mod stylet_free_tip;
 mod stylet_intervals;
+mod stylet_late_force;
 mod stylet_numerical_validity;
 mod stylet_offsets;
 mod stylet_relaxation;

@@ -391,3 +391,24 @@ fn a_drop_continues_below_minus_three_standard_deviations_and_ends_above_minus_t
         assert_eq!((found, stylet.post_rupture.is_none()), (falls, over), "{sds} after {since_s} s");
     }
 }
+
+#[test]
+fn before_the_law_is_confirmed_only_a_fall_by_half_the_force_of_a_sure_contact_is_a_rupture() {
+    let config = EnhanceConfig::default();
+    let is_rupture = |fall_n: f64, settled: bool, rises: bool| {
+        let mut stylet = inside();
+        (stylet.misfit_weight, stylet.contact_sample_m, stylet.baseline.settled) = (1.0, 0.009, settled);
+        stylet.snapshot.layer_confirmed = rises;
+        stylet.candidate = Some(DropCandidate {
+            from_n: 1.5,
+            mean_n: 1.5 - fall_n,
+            missing_n: fall_n,
+            duration_s: 0.005,
+            count: 1.0,
+        });
+        stylet.is_rupture(&config)
+    };
+    // The largest force is 1.2 N.
+    assert!(is_rupture(0.61, true, true) && !is_rupture(0.59, true, true));
+    assert!(!is_rupture(0.61, false, true) && !is_rupture(0.61, true, false));
+}

@@ -477,3 +477,12 @@ fn only_filters_that_are_not_finite_restart() {
     assert!(found.post_rupture.is_none() && found.estimator.belief.is_positive_definite());
     assert_same(&found.snapshot.belief, &found.estimator.belief);
 }
+
+#[test]
+fn the_noise_is_not_learned_from_an_event() {
+    let calm = inside();
+    let mut falling = inside();
+    falling.post_rupture = Some(falling.estimator);
+    assert!(after(calm, 1.44).noise.variance != calm.noise.variance);
+    assert_eq!(after(falling, 1.44).noise.variance, falling.noise.variance);
+}
