@@ -70,6 +70,34 @@ fn a_hidden_custom_effect_is_found_and_one_that_is_not_there_is_not() {
 }
 
 #[test]
+fn a_force_outside_the_library_gets_formulas_and_the_best_is_found_as_a_custom_effect() {
+    // A periodic force over depth, as of a grooved needle.
+    let grooves =
+        "Custom(name: \"grooves\", place: Tip, force: \"if(inserted > 0, c*sin(2*pi*z/p), 0)\", parameters: {
+        c: (start: 0.2, unit: \"N\", inactive: 0.0), p: (start: 0.006, unit: \"m\")})";
+    let assumed = scenario("", "", 1).expect("a scenario");
+    let hidden = recordings(grooves);
+    let found =
+        stylet_diagnose::diagnose(&assumed, &hidden, &Options::default(), |_| {}).expect("a diagnosis");
+    let d = &found.diagnosis;
+    assert_eq!(d.verdict, Verdict::Unknown);
+    let formulas = d.formulas.as_ref().expect("formulas");
+    assert_eq!(formulas.variables[0].variable, "z");
+    let best = &formulas.proposals[0];
+    assert!(best.held_out_n < 0.3 * d.gain.rmse_after_n, "{best:?}, without {}", d.gain.rmse_after_n);
+
+    let directory = Scratch::new("proposed_effects");
+    let text = stylet_scenario::effects_to_ron(&found.proposed_effects[..1]).expect("RON");
+    let file = directory.file("proposed_effects.ron", text);
+    let mut with = assumed.clone();
+    with.add_candidates(&file).expect("a file of effects");
+    let found = stylet_diagnose::diagnose(&with, &hidden, &Options::default(), |_| {}).expect("a diagnosis");
+    let causes: Vec<&str> = found.diagnosis.causes.iter().map(|c| c.effect.as_str()).collect();
+    assert_eq!(causes, [best.name.as_str()]);
+    assert!(found.diagnosis.formulas.is_none());
+}
+
+#[test]
 fn an_error_points_into_the_formula() {
     for (from, to, place, says) in [
         ("abs(v)/v0)", "abs(v)/v0) + v", "two_gels.ron:4:", "`v`: units do not fit: this has m/s"),
@@ -113,7 +141,7 @@ fn a_formula_without_a_value_ends_a_simulation_with_an_error() {
     let wild = custom("value: 20.0,").replace("log(1 + abs(v)/v0)", "exp(1e6*z_layer/v0/t)");
     let scenario = scenario(&wild, "", 1).expect("its units fit");
     let error = stylet_testbed::simulate(&scenario, 1).expect_err("no value").to_string();
-    assert!(error.contains("rate_stiffening") && error.contains("formula"), "{error}");
+    assert!(error.contains("rate_stiffening") && error.contains("equation"), "{error}");
 }
 
 #[test]

@@ -1,8 +1,8 @@
 //! Definition of effects that are not in the library, and the start values of a search for them.
 
 use crate::chain_stage::ChainStage;
-use crate::compile_custom::CustomError;
 use crate::custom_equation::{CustomDefinition, Equation};
+use crate::custom_error::CustomError;
 use crate::custom_names::{GrowingList, static_name};
 use crate::custom_text::{CustomText, Place};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};

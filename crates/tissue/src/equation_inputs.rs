@@ -1,7 +1,7 @@
 //! What formulas and code have in common: the names, units and parameters of an equation, and that an inactive effect vanishes.
 
-use crate::compile_custom::CustomError;
 use crate::custom_equation::{Equation, EquationSample, MAX_PARAMETERS, MAX_STATES};
+use crate::custom_error::CustomError;
 use crate::custom_names::static_name;
 use crate::custom_text::{CustomText, ParameterText, Place, Prior};
 use crate::effect_info::ParameterInfo;

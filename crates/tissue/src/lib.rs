@@ -28,6 +28,7 @@ mod chain_stage;
 mod compile_custom;
 mod compliant_needle;
 mod custom_equation;
+mod custom_error;
 mod custom_names;
 mod custom_text;
 mod define_custom;
@@ -47,8 +48,8 @@ mod rupture_policy;
 mod shaft_friction;
 
 pub use chain_stage::ChainStage;
-pub use compile_custom::CustomError;
 pub use custom_equation::{CustomDefinition, Equation, EquationSample, MAX_PARAMETERS, MAX_STATES};
+pub use custom_error::CustomError;
 pub use custom_text::{CustomText, NamedList, ParameterText, Place, Prior};
 pub use define_custom::known_effect_info;
 pub use effect::Effect;

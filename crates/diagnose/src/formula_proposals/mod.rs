@@ -23,13 +23,13 @@ use term::{Carrier, Factor, NamedValue, Sample, Shape, Variable};
 const INTERVALS: [usize; 2] = [16, 80];
 /// Variables, with their factors, from which formulas are built.
 const MAX_CARRIERS: usize = 3;
-/// Share of the largest gain that a variable must reach.
+/// Share of the largest gain that a variable must reach for formulas to be built from it.
 const MIN_SHARE: f64 = 0.5;
 /// Terms of a formula; eight parameters are possible, and a term has at most three.
 const MAX_TERMS: usize = 2;
-/// Proposals that are fitted and returned.
+/// Proposals that are returned.
 const MAX_PROPOSALS: usize = 5;
-/// Smallest gain (nats) of another term on recordings that were left out.
+/// Smallest gain (nats) of a variable, or of another term, on recordings that were left out.
 const MIN_TERM_NATS: f64 = 3.0;
 
 /// Formulas for what `model` leaves in the residual, best held-out prediction first, and their effects. `None` with one recording.
@@ -166,6 +166,11 @@ struct Formula {
 }
 
 impl Formula {
+    /// The force as a formula.
+    fn force(&self) -> String {
+        self.carrier.factor.times(&self.terms.join(" + "))
+    }
+
     /// The formula as a custom effect.
     fn text(&self) -> CustomText {
         let parameters = self.parameters.iter().map(|p| {
@@ -187,7 +192,7 @@ impl Formula {
         CustomText {
             name: self.name.clone(),
             place: Place::Tip,
-            force: self.carrier.factor.times(&self.terms.join(" + ")),
+            force: Some(self.force()),
             parameters: NamedList(parameters.collect()),
             state: NamedList(state.into_iter().collect()),
             source: String::new(),
@@ -209,7 +214,7 @@ impl Formula {
     fn report(&self, held_out_n: f64) -> ProposedFormula {
         ProposedFormula {
             name: self.name.clone(),
-            formula: self.text().force,
+            formula: self.force(),
             variable: self.carrier.variable.name().to_owned(),
             parameters: self.parameters.iter().map(|p| (p.name.clone(), p.value)).collect(),
             complexity: self.parameters.len(),
