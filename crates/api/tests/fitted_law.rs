@@ -71,7 +71,7 @@ fn with_a_law_fitted_elsewhere_the_enhanced_force_is_nearer_to_the_tips() -> Res
         let alone = enhance(r, &config).trace;
         let with_model = enhance_with_model(r, &config, &law)?.trace;
         assert_eq!(with_model.detections, alone.detections, "a model does not change the detections");
-        assert_eq!(with_model.detections.len(), 2, "seed {seed}: both ruptures");
+        assert_eq!(with_model.detections.len(), 2, "seed {seed}: both ruptures, {:?}", with_model.detections);
         let replayed = replayed_alone(&fitted(), r);
         for (part, (from_s, to_s)) in [(0.0, 12.0), (12.0, 14.0), (14.0, 24.0)].into_iter().enumerate() {
             for (sum, trace) in [

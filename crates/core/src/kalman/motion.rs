@@ -2,9 +2,9 @@
 
 use super::force_predictor::MotionStep;
 use super::shaft_friction::FORCE_TIME_CONSTANT_S;
-use super::state::KalmanEnhancer;
+use super::state::{KalmanEnhancer, SURE_DROP_SDS};
 use super::velocity_estimator::{DISAGREEMENT_MEMORY_S, REST_SPEED_MPS};
-use crate::bounds::at_least;
+use crate::bounds::{at_least, at_most};
 use crate::config::{EnhanceConfig, FrictionLaw};
 use crate::sample::Sample;
 
@@ -53,8 +53,8 @@ impl KalmanEnhancer {
         self.steady_drive_mps = step.speed_mps + dry_mps;
     }
 
-    /// Resolves a nonzero logged velocity at an unchanged position. If the force has jumped by the friction of that
-    /// velocity, the log is right; otherwise it is smoothed and the needle rests.
+    /// Resolves a nonzero logged velocity at an unchanged position. If the force has jumped in the direction of its friction, by half
+    /// of that or by more than the noise, the log is right; otherwise it is smoothed and the needle rests.
     #[inline(always)]
     pub(super) fn resolve_motion_start(
         &self,
@@ -72,7 +72,9 @@ impl KalmanEnhancer {
             self.estimator.predict(sample.position_m, 0.0),
         );
         let jump_n = sample.force_n - last.force_n;
-        if (jump_n > 0.0) == (logged > 0.0) && jump_n.abs() > 0.5 * (moving_n - resting_n).abs() {
+        let noise_n = SURE_DROP_SDS * libm::sqrt(2.0 * self.noise.marginal_variance());
+        let smallest_n = at_most(noise_n, 0.5 * (moving_n - resting_n).abs());
+        if (jump_n > 0.0) == (logged > 0.0) && jump_n.abs() > smallest_n {
             (logged, true)
         } else {
             (velocity_mps, sudden)

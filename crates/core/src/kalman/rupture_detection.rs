@@ -2,15 +2,15 @@
 
 use super::force_predictor::{MEMORY_M, MotionStep};
 use super::motion::SPEED_TIME_CONSTANT_S;
-use super::state::{DropCandidate, KalmanEnhancer, MAX_DROP_DURATION_S, OPERATIONS_PER_RUPTURE};
+use super::state::{
+    DropCandidate, KalmanEnhancer, MAX_DROP_DURATION_S, OPERATIONS_PER_RUPTURE, SURE_DROP_SDS,
+};
 use crate::bounds::{at_least, at_most};
 use crate::config::EnhanceConfig;
 use crate::sample::{Cause, Detection, Sample};
 
 /// Samples that the level of a candidate is averaged over at most.
 const MAX_AVERAGED_SAMPLES: f64 = 16.0;
-/// Size of a drop in standard deviations below the base law where that holds: exceeded by noise once in 30 000 tests.
-pub(super) const SURE_DROP_SDS: f64 = 4.0;
 /// Size of a drop in standard deviations where the base law is rejected: outside its 95 % interval.
 const LIKELY_DROP_SDS: f64 = 2.0;
 /// Smallest drop before the base law is confirmed, as a share of the largest force: the elastic share of the prior at contact.

@@ -19,6 +19,8 @@ pub(super) const MAX_ALARM_MISFIT: f64 = 1.2;
 pub(super) const MAX_STIFFNESS_N_PER_M: f64 = 2000.0;
 /// Multiplications and additions of a rupture (linear maps of six and five unknowns).
 pub(super) const OPERATIONS_PER_RUPTURE: u32 = 2 * 216 + 2 * 126 + 2 * 84;
+/// Size of a drop in standard deviations that noise exceeds once in 30 000 tests: the smallest drop where the base law holds.
+pub(super) const SURE_DROP_SDS: f64 = 4.0;
 /// Longest duration of an ordinary drop, in s.
 pub(super) const MAX_DROP_DURATION_S: f64 = 0.1;
 /// Misfit from which the base law is rejected; also the initial value, so that the law is used only after it has fitted data.

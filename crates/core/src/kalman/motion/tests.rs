@@ -66,15 +66,19 @@ fn presliding_friction_builds_up_over_its_travel_and_persists_in_a_hold() {
 use crate::kalman::test_support::{inside, near, sample};
 
 #[test]
-fn a_logged_start_is_accepted_if_the_force_shows_half_of_the_friction() {
-    // 115 N s/m at 10 mm: 0.23 N at 2 mm/s.
+fn a_logged_start_is_accepted_if_the_force_shows_half_of_its_friction_or_more_than_noise() {
+    let noise_n = 4.0 * libm::sqrt(2.0 * inside().noise.marginal_variance());
+    assert!(0.03 < noise_n && noise_n < 0.115);
+    // 115 N s/m at 10 mm: 0.23 N at 2 mm/s, 0.023 N at 0.2 mm/s.
     for (logged, jump_n, starts) in [
-        (0.002, 0.12, true),
-        (0.002, 0.11, false),
+        (0.002, 1.01 * noise_n, true),
+        (0.002, 0.99 * noise_n, false),
         (0.002, -0.12, false),
-        (-0.002, -0.12, true),
+        (-0.002, -1.01 * noise_n, true),
         (-0.002, 0.12, false),
-        (-0.002, -0.11, false),
+        (-0.002, -0.99 * noise_n, false),
+        (0.0002, 0.012, true),
+        (0.0002, 0.011, false),
         (1.1e-5, 0.12, true),
         (9e-6, 0.12, false),
     ] {
