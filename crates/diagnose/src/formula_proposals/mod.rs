@@ -2,7 +2,7 @@
 //!
 //! The residual of the final model is regressed on functions of one variable (time, position, velocity, ...), after projection onto the
 //! complement of the fitted parameters. Every regression is judged by the nats it gains on recordings that were left out. First, piecewise
-//! linear functions of every variable show which one carries the residual; then formulas are built from up to three terms of it
+//! linear functions of every variable show which one carries the residual; then formulas are built from up to two terms of it
 //! (orthogonal matching pursuit: Pati, Rezaiifar and Krishnaprasad 1993). The best ones are fitted together with the model, as custom
 //! effects, and predict the held-out recordings. They are effects to try, not a verdict.
 
@@ -31,6 +31,8 @@ const MAX_TERMS: usize = 2;
 const MAX_PROPOSALS: usize = 5;
 /// Smallest gain (nats) of a variable, or of another term, on recordings that were left out.
 const MIN_TERM_NATS: f64 = 3.0;
+/// Share by which a formula, or its second term, must lower the held-out error.
+const MIN_ERROR_GAIN: f64 = 0.02;
 
 /// Formulas for what `model` leaves in the residual, best held-out prediction first, and their effects. `None` with one recording.
 pub(crate) fn propose_formulas(
@@ -56,13 +58,18 @@ pub(crate) fn propose_formulas(
     let curve = best.curve();
     let carriers: Vec<&Ranked> =
         ranked.iter().filter(|r| r.nats > MIN_SHARE * best.nats).take(MAX_CARRIERS).collect();
-    let fitted = carriers.iter().enumerate().flat_map(|(k, r)| fitted_formulas(model, data, &samples, r, k));
-    let predicted = fitted.filter_map(|(formula, fit)| {
-        let error_n = pooled_rms(&held_out_residuals(&fit, data), data);
-        let effect = Custom::from_text(&formula.text()).ok()?;
-        (error_n < held_out_n).then(|| (formula.report(error_n), effect.into()))
-    });
-    let mut found: Vec<(ProposedFormula, AnyEffect)> = predicted.collect();
+    let mut found: Vec<(ProposedFormula, AnyEffect)> = Vec::new();
+    for (number, ranked) in carriers.iter().enumerate() {
+        let mut best_n = held_out_n;
+        for (formula, fit) in fitted_formulas(model, data, &samples, ranked, number) {
+            let error_n = pooled_rms(&held_out_residuals(&fit, data), data);
+            if error_n < (1.0 - MIN_ERROR_GAIN) * best_n {
+                let effect = Custom::from_text(&formula.text()).ok()?;
+                found.push((formula.report(error_n), effect.into()));
+                best_n = error_n;
+            }
+        }
+    }
     found.sort_by(|a, b| a.0.held_out_n.total_cmp(&b.0.held_out_n));
     found.truncate(MAX_PROPOSALS);
     let (proposals, effects) = found.into_iter().unzip();

@@ -34,24 +34,22 @@ pub fn partial_model(d: &Diagnosis) -> Option<String> {
     ))
 }
 
-/// What an unexplained residual is a function of, and the first formula to try, in words.
+/// The first formula to try for an unexplained residual, or else the variable that carries it, in words.
 #[must_use]
 pub fn proposed_formula(d: &Diagnosis) -> Option<String> {
     let formulas = d.formulas.as_ref()?;
-    let variable = &formulas.variables.first()?.variable;
-    Some(match formulas.proposals.first() {
-        Some(p) => format!(
-            "the residual is best described as a function of {variable}; a formula to try, {}: {} ({} N on held-out recordings; \
-             {} in proposed_effects.ron)",
-            p.name,
-            p.formula,
-            significant(p.held_out_n, 3),
-            if formulas.proposals.len() == 1 { "the only one" } else { "all" }
-        ),
-        None => format!(
-            "the residual is best described as a function of {variable}; no simple formula predicts held-out recordings better"
-        ),
-    })
+    let Some(p) = formulas.proposals.first() else {
+        let variable = &formulas.variables.first()?.variable;
+        return Some(format!(
+            "the residual depends most on {variable}; no simple formula predicts held-out recordings better"
+        ));
+    };
+    Some(format!(
+        "a function of {} to try as a custom effect: {} ({} N on held-out recordings; --effects proposed_effects.ron)",
+        p.variable,
+        p.formula,
+        significant(p.held_out_n, 3)
+    ))
 }
 
 /// Effects that these recordings cannot separate from a simpler one that is named.
