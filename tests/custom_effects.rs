@@ -67,6 +67,9 @@ fn a_hidden_custom_effect_is_found_and_one_that_is_not_there_is_not() {
     let found =
         stylet_diagnose::diagnose(&assumed, &clean, &Options::default(), |_| {}).expect("a diagnosis");
     assert_eq!(found.diagnosis.verdict, Verdict::None, "{:?}", found.diagnosis.causes);
+    // The report says that it was tried.
+    let said = stylet_report::pages::diagnosis::unneeded_custom_effects(&found.diagnosis);
+    assert!(said.len() == 1 && said[0].starts_with("rate_stiffening is not needed"), "{said:?}");
 }
 
 #[test]

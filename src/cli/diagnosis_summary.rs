@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use stylet_diagnose::Diagnosis;
 use stylet_report::pages::diagnosis::{
     different_recordings, findings, general_forms, lower_limits, partial_model, proposed_formula,
-    recording_differences, summary_sentence, undetermined_parameters,
+    recording_differences, summary_sentence, undetermined_parameters, unneeded_custom_effects,
 };
 use stylet_report::significant;
 
@@ -57,7 +57,8 @@ pub fn summary(d: &Diagnosis) -> String {
     for sentence in findings(d) {
         let _ = writeln!(out, "  {sentence}");
     }
-    for sentence in partial_model(d).into_iter().chain(proposed_formula(d)) {
+    for sentence in partial_model(d).into_iter().chain(proposed_formula(d)).chain(unneeded_custom_effects(d))
+    {
         let _ = writeln!(out, "  {sentence}");
     }
     for sentence in lower_limits(d) {

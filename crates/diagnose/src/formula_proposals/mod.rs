@@ -22,7 +22,7 @@ use term::{Carrier, Factor, NamedValue, Sample, Shape, Variable};
 /// Numbers of intervals of the piecewise linear functions: a smooth function, and one that varies quickly.
 const INTERVALS: [usize; 2] = [16, 80];
 /// Variables, with their factors, from which formulas are built.
-const MAX_CARRIERS: usize = 3;
+const MAX_CARRIERS: usize = 4;
 /// Share of the largest gain that a variable must reach for formulas to be built from it.
 const MIN_SHARE: f64 = 0.5;
 /// Terms of a formula; eight parameters are possible, and a term has at most three.
@@ -73,7 +73,10 @@ pub(crate) fn propose_formulas(
     found.sort_by(|a, b| a.0.held_out_n.total_cmp(&b.0.held_out_n));
     found.truncate(MAX_PROPOSALS);
     let (proposals, effects) = found.into_iter().unzip();
-    let variables = ranked.iter().map(Ranked::report).collect();
+    // Every variable once, with its best factor.
+    let first =
+        |(k, r): &(usize, &Ranked)| ranked[..*k].iter().all(|o| o.carrier.variable != r.carrier.variable);
+    let variables = ranked.iter().enumerate().filter(first).map(|(_, r)| r.report()).collect();
     Some((ProposedFormulas { variables, curve, proposals }, effects))
 }
 
@@ -112,7 +115,7 @@ impl Ranked {
     }
 }
 
-/// Carriers that gain on recordings that were left out, largest gain first; every variable once, with its best factor.
+/// Carriers that gain on recordings that were left out, largest gain first.
 fn rank_carriers(regression: &Regression, data: &FitData, samples: &[Vec<Sample>]) -> Vec<Ranked> {
     let mut ranked: Vec<Ranked> = Vec::new();
     for variable in Variable::ALL {
@@ -132,8 +135,7 @@ fn rank_carriers(regression: &Regression, data: &FitData, samples: &[Vec<Sample>
             });
             tried.max_by(|a, b| a.nats.total_cmp(&b.nats))
         };
-        let best = Factor::ALL.iter().filter_map(of_factor).max_by(|a, b| a.nats.total_cmp(&b.nats));
-        ranked.extend(best.filter(|r| r.nats > MIN_TERM_NATS));
+        ranked.extend(Factor::ALL.iter().filter_map(of_factor).filter(|r| r.nats > MIN_TERM_NATS));
     }
     ranked.sort_by(|a, b| b.nats.total_cmp(&a.nats));
     ranked

@@ -11,7 +11,7 @@ pub(crate) use parameter_labels::label_cell;
 pub use parameter_labels::{different_recordings, undetermined_parameters};
 pub use summary_sentence::{
     findings, general_forms, lower_limits, partial_model, proposed_formula, recording_differences,
-    summary_sentence,
+    summary_sentence, unneeded_custom_effects,
 };
 
 use crate::page_model::{Page, Section, Status, Tile};
@@ -143,6 +143,7 @@ fn verdict(d: &Diagnosis) -> Section {
         .into_iter()
         .chain(partial_model(d))
         .chain(proposed_formula(d))
+        .chain(unneeded_custom_effects(d))
         .chain(undetermined_parameters(d))
         .chain(different_recordings(d))
         .collect();

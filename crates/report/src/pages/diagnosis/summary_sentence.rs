@@ -1,9 +1,12 @@
 //! A diagnosis in one sentence.
 
 use stylet_diagnose::claims::{contradicts, parameter_name};
-use stylet_diagnose::diagnosis_json::{BaseParameter, Cause, Diagnosis, Finding, FindingKind, Verdict};
+use stylet_diagnose::diagnosis_json::{
+    BaseParameter, Cause, Diagnosis, Finding, FindingKind, SearchStep, Verdict,
+};
 use stylet_record::QualityKind;
 use stylet_stats::number_format::significant;
+use stylet_tissue::known_effect_info;
 
 /// The verdict in one sentence, with the recordings that are outliers.
 #[must_use]
@@ -50,6 +53,34 @@ pub fn proposed_formula(d: &Diagnosis) -> Option<String> {
         p.formula,
         significant(p.held_out_n, 3)
     ))
+}
+
+/// Why custom effects among the candidates are not causes, in words.
+#[must_use]
+pub fn unneeded_custom_effects(d: &Diagnosis) -> Vec<String> {
+    let tested = d.visible_effects.iter().map(|e| &e.effect).chain(&d.not_identifiable);
+    let custom = |id: &str| known_effect_info(id).is_some_and(|info| info.custom.is_some());
+    let unneeded = tested.filter(|id| custom(id) && d.causes.iter().all(|c| c.effect != **id));
+    let sentence = |id: &String| {
+        let of_step = |s: &SearchStep, name: &str| {
+            s.candidates.iter().find(|c| c.effect == name).map(|c| (c.gain_nats, c.parameters))
+        };
+        let fitted = d.search_steps.iter().find_map(|s| {
+            let (nats, parameters) = of_step(s, id)?;
+            let selected = s.selected.as_deref()?;
+            let (selected_nats, selected_parameters) = of_step(s, selected)?;
+            Some(format!(
+                "it gains {} nats with {parameters} parameters, {selected} {} with {selected_parameters}",
+                significant(nats, 4),
+                significant(selected_nats, 4)
+            ))
+        });
+        format!(
+            "{id} is not needed: {}",
+            fitted.unwrap_or_else(|| "it gains too little to be selected".to_owned())
+        )
+    };
+    unneeded.map(sentence).collect()
 }
 
 /// Effects that these recordings cannot separate from a simpler one that is named.
