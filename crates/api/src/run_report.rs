@@ -88,6 +88,7 @@ fn combination(recording: &Recording, ran: &AlgorithmRun) -> report::Combination
         name: ran.name.clone(),
         sensor: ran.sensor.to_owned(),
         contact_s: trace.contact_s,
+        contact: trace.contact.sentence(),
         reconstructed_force_n: trace.reconstructed_n.clone(),
         enhanced_force_n: trace.enhanced_n.clone(),
         tip_force_low_n: trace.low_n.clone(),

@@ -182,6 +182,8 @@ pub struct Combination {
     pub sensor: String,
     /// Time of first contact in s, known or detected.
     pub contact_s: Option<f64>,
+    /// How the recording begins, in words: position of the contact with its interval, and the baseline in air.
+    pub contact: String,
     /// Reconstructed force: regressor times estimates plus `D v`.
     pub reconstructed_force_n: Vec<f64>,
     /// Enhanced force `f - D v`.

@@ -131,7 +131,8 @@ fn unscored(combination: &Combination) -> Vec<Tile> {
     let mut tiles =
         vec![Tile::new("Ruptures detected", combination.detections.len().to_string(), times.join(", "))];
     if let Some(contact_s) = combination.contact_s {
-        tiles.push(Tile::new("First contact", format!("{} s", significant(contact_s, 4)), ""));
+        let at = format!("{} s", significant(contact_s, 4));
+        tiles.push(Tile::new("First contact", at, combination.contact.clone()));
     }
     let friction = combination.cumulative_friction_ns_per_m.iter().copied().filter(|d| d.is_finite());
     if let Some(largest) = friction.reduce(f64::max) {
