@@ -15,6 +15,7 @@ use regression::{Regression, Solution};
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{EffectTerm, Model};
+use stylet_stats::normal::Z95;
 use stylet_stats::parallel::*;
 use stylet_tissue::{AnyEffect, Custom, CustomText, NamedList, ParameterText, Place, Prior};
 use term::{Carrier, Factor, NamedValue, Sample, Shape, Variable};
@@ -63,8 +64,11 @@ pub(crate) fn propose_formulas(
         let mut best_n = held_out_n;
         for (formula, fit) in fitted_formulas(model, data, &samples, ranked, number) {
             let error_n = pooled_rms(&held_out_residuals(&fit, data), data);
-            if error_n < (1.0 - MIN_ERROR_GAIN) * best_n {
-                let effect = Custom::from_text(&formula.text()).ok()?;
+            if error_n >= (1.0 - MIN_ERROR_GAIN) * best_n {
+                continue;
+            }
+            // A text that is refused, such as one whose strength has vanished, is no proposal.
+            if let Ok(effect) = Custom::from_text(&formula.text()) {
                 found.push((formula.report(error_n), effect.into()));
                 best_n = error_n;
             }
@@ -101,7 +105,7 @@ impl Ranked {
     fn curve(&self) -> ResidualCurve {
         let around = |sign: f64| {
             let both = self.solution.coefficients.iter().zip(&self.solution.standard_errors);
-            both.map(|(x, e)| x + sign * 1.96 * e).collect()
+            both.map(|(x, e)| x + sign * Z95 * e).collect()
         };
         ResidualCurve {
             variable: self.carrier.variable.name().to_owned(),
