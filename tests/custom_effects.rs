@@ -168,3 +168,34 @@ fn the_commands_take_a_file_of_effects() {
     let table = stylet(&["identifiability", "scenarios/three_layers.ron", "--out", &out]);
     assert!(table.contains("rate_stiffening"), "{table}");
 }
+
+#[test]
+fn a_benchmark_hides_the_effects_of_a_file_among_the_candidates() {
+    let scratch = Scratch::new("custom-benchmark");
+    let file = |name: &str, effect: &str| scratch.file(name, format!("[{effect}]")).display().to_string();
+    let mine = file("mine.ron", &custom(""));
+    let out = scratch.path().join("out").display().to_string();
+    let benchmark = |words: &[&str]| support::stylet(&[&["benchmark", "diagnose"], words].concat());
+    let hides = ["--hide", "custom,clean", "--cases", "2", "--seed", "3", "--out", &out];
+    let run = benchmark(&[&hides[..], &["--effects", &mine]].concat());
+    let table = String::from_utf8_lossy(&run.stdout);
+    assert!(run.status.success(), "{}", support::stderr_text(&run));
+    let journal = || std::fs::read_to_string(scratch.path().join("out/cases.jsonl")).expect("a journal");
+    let outcomes = journal();
+    let hidden: Vec<&str> =
+        outcomes.lines().filter(|l| l.contains("\"hidden\":[\"rate_stiffening\"]")).collect();
+    assert!(hidden.len() == 1 && outcomes.lines().count() == 2, "{outcomes}");
+    assert!(hidden[0].contains("\"correct\":true"), "{table}");
+    // The answers depend on the candidates, so they are not mixed with those of other effects.
+    let other = file("other.ron", &custom("").replace("start: 8.0", "start: 9.0"));
+    for effects in [&["--effects", other.as_str()][..], &[]] {
+        let refused = benchmark(&[&hides[..], effects].concat());
+        assert!(!refused.status.success());
+        let says = support::stderr_text(&refused);
+        assert!(
+            says.contains(if effects.is_empty() { "--effects" } else { "other custom effects" }),
+            "{says}"
+        );
+    }
+    assert_eq!(journal(), outcomes);
+}

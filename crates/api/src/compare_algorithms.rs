@@ -52,7 +52,7 @@ pub fn case_groups(world: &str, hide: &[String], cases: u64, seed: u64) -> Resul
     let world = parse_word("--world", world, World::ALL, World::parse, World::as_str)?;
     hide.iter()
         .map(|word| {
-            let hide = parse_word("--hide", word, Hide::ALL, Hide::parse, Hide::as_str)?;
+            let hide = parse_word("--hide", word, Hide::BUILT_IN, Hide::parse, Hide::as_str)?;
             let plan = Plan {
                 world,
                 wrong: vec![Wrong::Nothing],

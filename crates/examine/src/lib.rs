@@ -25,10 +25,11 @@ pub mod success_rate;
 mod words;
 
 pub use cases::case_id::{CaseId, Hide, Severity, Size, World, Wrong};
-pub use cases::case_recordings::{Case, NamedFile, Question, make_case};
+pub use cases::case_recordings::{Case, NamedFile, Question, make_case, make_case_with};
+pub use cases::custom_effect::CustomEffect;
 pub use cases::second_insertion::SecondInsertion;
 pub use examination_plan::Plan;
-pub use run_cases::{RunError, run_cases};
+pub use run_cases::{RunError, run_cases, run_cases_with};
 pub use scoring::case_outcome::CaseOutcome;
 pub use scoring::diagnosis_answer::{Answer, Verdict};
 pub use scoring::results_table;

@@ -1,13 +1,14 @@
 //! Runs an examination in parallel; deterministic and resumable.
 
 use crate::cases::case_id::{CaseId, GENERATOR_VERSION};
-use crate::cases::case_recordings::{Question, make_case};
+use crate::cases::case_recordings::{Question, make_case_with};
+use crate::cases::custom_effect::CustomEffect;
 use crate::scoring::case_outcome::CaseOutcome;
 use crate::scoring::diagnosis_answer::Answer;
 use std::collections::BTreeMap;
 use std::io::{BufRead, Write};
 use std::path::Path;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::time::Instant;
 use stylet_stats::parallel::*;
 
@@ -45,6 +46,20 @@ pub fn run_cases(
     engine: &(dyn Fn(&Question) -> Result<Answer, String> + Sync),
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Vec<CaseOutcome>, RunError> {
+    run_cases_with(cases, &[], journal, engine, progress)
+}
+
+/// As [`run_cases`]; cases with [`Hide::Custom`](crate::Hide::Custom) hide one of the effects `custom`.
+///
+/// # Errors
+/// As [`run_cases`].
+pub fn run_cases_with(
+    cases: &[CaseId],
+    custom: &[Arc<dyn CustomEffect>],
+    journal: Option<&Path>,
+    engine: &(dyn Fn(&Question) -> Result<Answer, String> + Sync),
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<CaseOutcome>, RunError> {
     let failed =
         |why| RunError::Journal { path: journal.map_or_else(String::new, |p| p.display().to_string()), why };
     let mut done: BTreeMap<CaseId, CaseOutcome> = BTreeMap::new();
@@ -69,7 +84,8 @@ pub fn run_cases(
     let new: Result<Vec<CaseOutcome>, RunError> = missing
         .par_iter()
         .map(|id| {
-            let case = make_case(id).map_err(|why| RunError::Draw { name: id.name(), why: Box::new(why) })?;
+            let case = make_case_with(id, custom)
+                .map_err(|why| RunError::Draw { name: id.name(), why: Box::new(why) })?;
             let start = Instant::now();
             let answer = engine(&case.question);
             let outcome = CaseOutcome::new(&case, answer, start.elapsed().as_secs_f64());

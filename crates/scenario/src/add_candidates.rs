@@ -2,10 +2,11 @@
 
 use crate::input_error::InputError;
 use crate::load_ron::{parse, read_text};
+use crate::motion::Motion;
 use crate::scenario::Scenario;
 use crate::validate_effects::candidate;
-use std::path::Path;
-use stylet_tissue::{AnyEffect, Effect};
+use std::path::{Path, PathBuf};
+use stylet_tissue::{AnyEffect, Effect, Tissue};
 
 /// The effects of a file of custom effects.
 ///
@@ -13,6 +14,18 @@ use stylet_tissue::{AnyEffect, Effect};
 /// [`InputError`] with line and column.
 pub fn load_effects(file: &Path) -> Result<Vec<AnyEffect>, InputError> {
     parse(&file.display().to_string(), &read_text(file)?)
+}
+
+/// The effects of files of custom effects, as candidates of any scenario; duplicates are kept once.
+///
+/// # Errors
+/// As [`Scenario::add_candidates`].
+pub fn load_candidates(files: &[PathBuf]) -> Result<Vec<AnyEffect>, InputError> {
+    let mut scenario = Scenario::new(String::new(), Tissue::three_gels(), Motion::Recorded);
+    for file in files {
+        scenario.add_candidates(file)?;
+    }
+    Ok(scenario.candidates)
 }
 
 /// The effects as the text of such a file.

@@ -30,7 +30,7 @@ mod validate_enhancer;
 mod validate_motion;
 mod validate_scenario;
 
-pub use add_candidates::{effects_to_ron, load_effects};
+pub use add_candidates::{effects_to_ron, load_candidates, load_effects};
 pub use arm_insertion_line::{Approach, ArmInsertionLine};
 pub use arm_joint_friction::{ArmFriction, CoulombViscous, Sigmoid};
 pub use distribution::Distribution;

@@ -74,6 +74,7 @@ impl CaseArgs {
             cases: self.cases,
             seed: self.seed,
             effect: &self.effect,
+            custom: false,
         }
     }
 }
@@ -87,6 +88,7 @@ impl CaseArgs {
   stylet benchmark diagnose --hide outside --cases 48
   stylet benchmark diagnose --wrong all --severity large --effect time_delay --cases 60
   stylet benchmark diagnose --world rich --hide one --cases 60
+  stylet benchmark diagnose --hide custom,clean --effects effects/mine.ron --cases 24
 
 The error about an unknown word of --wrong or --hide lists all words.
 
@@ -95,6 +97,10 @@ intervals), table.json and cases.jsonl, one line per case. An interrupted run re
 pub struct BenchmarkDiagnoseArgs {
     #[command(flatten)]
     pub cases: CaseArgs,
+    /// Custom effects as further candidates, and for `--hide custom`: lists of `Custom(...)` (RON). Rows without a scenario
+    /// are left out.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    pub effects: Vec<PathBuf>,
     /// Cases run in parallel [default: number of cores].
     #[arg(long, value_name = "N", value_parser = parse_threads)]
     pub threads: Option<usize>,

@@ -6,18 +6,22 @@ use crate::cli::progress_bar::Progress;
 use crate::cli::terminal_output::{print, print_error};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use stylet_api::benchmark::DiagnosisBenchmark;
+use stylet_api::benchmark::{CaseSelection, DiagnosisBenchmark};
+use stylet_scenario::load_candidates;
 
 /// The command.
 ///
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &BenchmarkDiagnoseArgs) -> Result<(), Failure> {
-    let plan = args.cases.selection().plan()?;
+    let custom = load_candidates(&args.effects)?;
+    let selection =
+        CaseSelection { custom: !custom.is_empty() || args.from_journal, ..args.cases.selection() };
+    let plan = selection.plan()?;
     let folder = args.out.clone().unwrap_or_else(|| {
         PathBuf::from("stylet-out").join(format!("benchmark-diagnose-{}-{}", plan.world, plan.seed))
     });
-    let benchmark = DiagnosisBenchmark::new(plan, &folder, args.from_journal)?;
+    let benchmark = DiagnosisBenchmark::new(plan, custom, &folder, args.from_journal)?;
     let bar = Progress::new(benchmark.cases.len() as u64, "cases", false);
     let previous = AtomicUsize::new(0);
     let progress = |done: usize, of: usize| {

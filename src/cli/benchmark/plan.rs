@@ -21,6 +21,7 @@ pub fn plan(args: &BenchmarkPlanArgs) -> Result<(), Failure> {
         cases: 1,
         seed: args.seed,
         effect: &[],
+        custom: false,
     }
     .plan()?;
     let folder = args.out.clone().unwrap_or_else(|| {

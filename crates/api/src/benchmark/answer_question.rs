@@ -3,14 +3,17 @@
 use stylet_diagnose::{NamedRecording, Options};
 use stylet_examine::{Answer, Question};
 use stylet_scenario::Scenario;
+use stylet_tissue::AnyEffect;
 
-/// Answers a question as `stylet diagnose` would.
+/// Answers a question as `stylet diagnose` would, with custom effects among the candidates.
 ///
 /// # Errors The reason for a missing answer.
-pub fn answer_question(question: &Question) -> Result<Answer, String> {
+pub fn answer_question(question: &Question, custom: &[AnyEffect]) -> Result<Answer, String> {
     let (options, recordings) = (Options::default(), named_recordings(question));
     let result = if question.assumed_ron.is_some() {
-        stylet_diagnose::diagnose(&assumed_scenario(question)?, &recordings, &options, |_| {})
+        let mut scenario = assumed_scenario(question)?;
+        scenario.candidates.extend_from_slice(custom);
+        stylet_diagnose::diagnose(&scenario, &recordings, &options, |_| {})
     } else {
         stylet_diagnose::identify(&question.name, &recordings, None, &options, |_| {}).map(|found| found.1)
     };

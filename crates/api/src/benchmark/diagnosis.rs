@@ -1,13 +1,17 @@
 //! Accuracy of the diagnosis on cases of the independent simulator.
 
+use super::custom_effects::HiddenEffect;
 use super::{answer_question, parse_word, thread_pool};
 use crate::error::Error;
 use crate::output_files::OutputFiles;
-use crate::output_folder::OutputLock;
+use crate::output_folder::{OutputLock, write_file_atomically};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use stylet_examine::cases::hide_effects::{hidden_name, hidden_names};
-use stylet_examine::{CaseId, Hide, Plan, Severity, Size, World, Wrong, results_table};
+use stylet_examine::{CaseId, CustomEffect, Hide, Plan, Severity, Size, World, Wrong, results_table};
 use stylet_report::pages::examination::{accuracy_maps, page};
+use stylet_scenario::effects_to_ron;
+use stylet_tissue::AnyEffect;
 
 /// Selection of cases in words; `all` stands for all words of a list.
 #[derive(Clone, Debug)]
@@ -28,10 +32,12 @@ pub struct CaseSelection<'a> {
     pub seed: u64,
     /// Only cases that hide one of these; empty: all.
     pub effect: &'a [String],
+    /// Whether custom effects are given, one of which a case may hide.
+    pub custom: bool,
 }
 
 /// Parses a list of words, or gives all of them for `all`.
-fn parse_words<T: Copy>(
+fn parse_words<T: Copy + PartialEq>(
     what: &str,
     given: &[String],
     all: &[T],
@@ -51,12 +57,25 @@ impl CaseSelection<'_> {
     /// [`Error::Request`] for an unknown word, with the known ones.
     pub fn plan(&self) -> Result<Plan, Error> {
         let one = |given: &str| vec![given.to_owned()];
+        let hides_custom = self.hide.iter().any(|word| word.trim() == Hide::Custom.as_str());
+        if hides_custom && !self.custom {
+            return Err(Error::Request(
+                "--hide custom: hides one of your own effects; give `stylet benchmark diagnose` their files with --effects"
+                    .to_owned(),
+            ));
+        }
+        let hides = if self.custom { Hide::ALL } else { Hide::BUILT_IN };
         let world = parse_words("--world", &one(self.world), World::ALL, World::parse, World::as_str)?;
         let size = parse_words("--size", &one(self.size), Size::ALL, Size::parse, Size::as_str)?;
         let (Some(&world), Some(&size)) = (world.first(), size.first()) else {
             return Err(Error::internal("a list of words is empty"));
         };
-        let plan = Plan {
+        if hides_custom && world != World::Plain {
+            return Err(Error::Request(
+                "--hide custom: only the plain world has custom effects; leave out --world".to_owned(),
+            ));
+        }
+        let mut plan = Plan {
             world,
             wrong: parse_words("--wrong", self.misspecification, Wrong::ALL, Wrong::parse, Wrong::as_str)?,
             severities: parse_words(
@@ -66,12 +85,14 @@ impl CaseSelection<'_> {
                 Severity::parse,
                 Severity::as_str,
             )?,
-            hide: parse_words("--hide", self.hide, Hide::ALL, Hide::parse, Hide::as_str)?,
+            hide: parse_words("--hide", self.hide, hides, Hide::parse, Hide::as_str)?,
             size,
             cases: self.cases,
             seed: self.seed,
             only: parse_words("--effect", self.effect, &hidden_names(), hidden_name, |t| t)?,
         };
+        // Without a scenario there is nothing that could name custom effects as candidates.
+        plan.wrong.retain(|wrong| !self.custom || *wrong != Wrong::NoScenario);
         if !plan.only.is_empty() && plan.cases().is_empty() {
             return Err(Error::Request(format!(
                 "--effect {}: none of these cases hides it; effects are hidden by `--hide one` in the plain world, other shapes by `--hide \
@@ -88,25 +109,28 @@ pub struct DiagnosisBenchmark {
     /// The cases.
     pub cases: Vec<CaseId>,
     plan: Plan,
+    custom: Vec<AnyEffect>,
     journal: PathBuf,
     lock: OutputLock,
 }
 
 impl DiagnosisBenchmark {
-    /// Locks the folder. With `from_journal` only the cases in its journal are selected.
+    /// Locks the folder. The effects `custom` are candidates of every diagnosis, and cases with [`Hide::Custom`] hide one of them. With
+    /// `from_journal` only the cases in the folder's journal are selected.
     ///
     /// # Errors
-    /// [`Error::Output`], [`Error::Busy`].
-    pub fn new(plan: Plan, folder: &Path, from_journal: bool) -> Result<Self, Error> {
+    /// [`Error::Output`], [`Error::Busy`]; [`Error::Request`] when the journal belongs to other custom effects.
+    pub fn new(plan: Plan, custom: Vec<AnyEffect>, folder: &Path, from_journal: bool) -> Result<Self, Error> {
         let lock = OutputLock::new(folder)?;
         let journal = folder.join("cases.jsonl");
+        keep_effects(&custom, folder, journal.exists() && !from_journal)?;
         let mut cases = plan.cases();
         if from_journal {
             let completed = stylet_examine::run_cases::read_journal(&journal)
                 .map_err(|why| Error::output(folder, why))?;
             cases.retain(|id| completed.contains_key(id));
         }
-        Ok(Self { cases, plan, journal, lock })
+        Ok(Self { cases, plan, custom, journal, lock })
     }
 
     /// Diagnoses the cases, scores the answers, writes table, page and maps, and returns the table as text. `progress` is called with the
@@ -115,11 +139,12 @@ impl DiagnosisBenchmark {
     /// # Errors
     /// [`Error::Internal`] when a case cannot be simulated, [`Error::Output`].
     pub fn run(&self, threads: usize, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<String, Error> {
-        let Self { cases, plan, journal, lock } = self;
+        let Self { cases, plan, custom, journal, lock } = self;
+        let hidden: Vec<Arc<dyn CustomEffect>> =
+            custom.iter().map(|effect| Arc::new(HiddenEffect(effect.clone())) as _).collect();
+        let engine = |question: &_| answer_question::answer_question(question, custom);
         let outcomes = thread_pool(threads)?
-            .install(|| {
-                stylet_examine::run_cases(cases, Some(journal), &answer_question::answer_question, progress)
-            })
+            .install(|| stylet_examine::run_cases_with(cases, &hidden, Some(journal), &engine, progress))
             .map_err(Error::internal)?;
         let text = results_table::results_text(&outcomes);
         let cells = results_table::table_cells(&outcomes);
@@ -135,6 +160,20 @@ impl DiagnosisBenchmark {
     }
 }
 
+/// Keeps the custom effects beside the journal, whose answers depend on them.
+fn keep_effects(custom: &[AnyEffect], folder: &Path, has_journal: bool) -> Result<(), Error> {
+    let path = folder.join("effects.ron");
+    let text = effects_to_ron(custom).map_err(Error::internal)?;
+    let kept = std::fs::read_to_string(&path).ok();
+    if has_journal && kept.as_deref().unwrap_or("[]") != text {
+        return Err(Error::Request(format!(
+            "{}: holds cases with other custom effects; name the same files with --effects, or another folder with --out",
+            folder.display()
+        )));
+    }
+    if custom.is_empty() || kept.is_some() { Ok(()) } else { write_file_atomically(&path, text.as_bytes()) }
+}
+
 /// File name of a map.
 fn map_name(hide: Hide) -> &'static str {
     match hide {
@@ -145,5 +184,6 @@ fn map_name(hide: Hide) -> &'static str {
         Hide::Outside => "map_outside.svg",
         Hide::Mixed => "map_beside.svg",
         Hide::Instrument => "map_instrument.svg",
+        Hide::Custom => "map_custom.svg",
     }
 }

@@ -2,6 +2,7 @@
 
 mod answer_question;
 mod case_journal;
+mod custom_effects;
 mod diagnosis;
 mod online;
 mod planning;
@@ -16,14 +17,14 @@ use crate::error::Error;
 ///
 /// # Errors
 /// [`Error::Request`] for an unknown word, with the known ones.
-pub(crate) fn parse_word<T: Copy>(
+pub(crate) fn parse_word<T: Copy + PartialEq>(
     what: &str,
     given: &str,
     all: &[T],
     parse: fn(&str) -> Option<T>,
     word: fn(T) -> &'static str,
 ) -> Result<T, Error> {
-    parse(given).ok_or_else(|| {
+    parse(given).filter(|found| all.contains(found)).ok_or_else(|| {
         let known: Vec<&str> = all.iter().map(|x| word(*x)).collect();
         Error::Request(format!("{what}: there is no `{given}`; there are {}", known.join(", ")))
     })

@@ -1,6 +1,7 @@
 //! What defines a case: misspecification, assumed and true tissue, motions, hidden effects and noise parameters.
 
 use super::case_id::World;
+use super::custom_effect::CustomEffect;
 use super::misspecification_amounts::MisspecificationAmounts;
 use super::unmodelled_shapes::UnmodelledShape;
 use crate::simulator::effect::Effect;
@@ -10,6 +11,7 @@ use crate::simulator::plain_world::PlainWorld;
 use crate::simulator::rich_world::{RichEffects, RichWorld};
 use crate::simulator::sensor_noise::SensorNoise;
 use crate::simulator::tissue::Tissue;
+use std::sync::Arc;
 
 /// A case without its noise realisation.
 #[derive(Clone, Debug)]
@@ -30,6 +32,8 @@ pub struct CaseSetup {
     pub rich: RichEffects,
     /// Hidden effects of the library.
     pub effects: Vec<Effect>,
+    /// Hidden effect that the caller defines; then there is no other.
+    pub custom: Option<Arc<dyn CustomEffect>>,
     /// Hidden force outside the library.
     pub shape: Option<UnmodelledShape>,
     /// Strength of everything hidden, in noise standard deviations.
@@ -40,6 +44,9 @@ impl CaseSetup {
     /// The force law of a tissue in this world. Under the rich law only effects of tool and sensor are taken from the library.
     #[must_use]
     pub fn law(&self, tissue: &Tissue, effects: &[Effect]) -> Box<dyn ForceLaw> {
+        if let Some(custom) = &self.custom {
+            return custom.law(tissue);
+        }
         match self.world {
             World::Plain => Box::new(PlainWorld::new(tissue, effects)),
             World::Rich => Box::new(RichWorld::new(tissue, &self.rich)),

@@ -64,7 +64,16 @@ words! {
         Outside = "outside": "something that the library lacks",
         Mixed = "mixed": "one effect together with something that the library lacks",
         Instrument = "instrument": "an instrument fault in six repeats of three motions",
+        Custom = "custom": "a custom effect",
     }
+}
+
+impl Hide {
+    /// Everything that the simulator hides by itself.
+    pub const BUILT_IN: &'static [Hide] = match Self::ALL.split_last() {
+        Some((_custom, built_in)) => built_in,
+        None => &[],
+    };
 }
 
 words! {

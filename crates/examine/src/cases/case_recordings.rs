@@ -3,6 +3,7 @@
 use super::case_definition::CaseSetup;
 use super::case_id::CaseId;
 use super::case_setup::set_up_case;
+use super::custom_effect::CustomEffect;
 use super::draw_tissue;
 use super::misspecification_amounts::MisspecificationAmounts;
 use crate::simulator::effect::Effect;
@@ -12,6 +13,7 @@ use crate::simulator::motion_path::MotionPath;
 use crate::simulator::sensor_noise::NoiseGenerator;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
+use std::sync::Arc;
 use stylet_record::Recording;
 
 /// Longest step of the simulation in s (5 kHz).
@@ -56,7 +58,18 @@ pub struct Case {
 ///
 /// # Errors When the simulated columns are not a valid recording, which would be a bug of this crate.
 pub fn make_case(id: &CaseId) -> Result<Case, stylet_record::RecordError> {
-    let setup = set_up_case(id);
+    make_case_with(id, &[])
+}
+
+/// Generates a case, which may hide one of the caller's own effects ([`Hide::Custom`](super::case_id::Hide::Custom)).
+///
+/// # Errors
+/// As [`make_case`].
+pub fn make_case_with(
+    id: &CaseId,
+    custom: &[Arc<dyn CustomEffect>],
+) -> Result<Case, stylet_record::RecordError> {
+    let setup = set_up_case(id, custom);
     let mut rng = ChaCha8Rng::seed_from_u64(id.case_seed());
     rng.set_stream(0);
     let (mut recordings, mut there) = (Vec::new(), Vec::new());

@@ -3,27 +3,30 @@
 
 use super::case_definition::CaseSetup;
 use super::case_id::{CaseId, Hide, Size};
+use super::custom_effect::CustomEffect;
 use super::distinguishable_effects::{is_clear_of_ruptures, is_identified_by_ruptures};
 use super::draw_effect;
 use super::draw_motion::{self, log_uniform, uniform};
 use super::draw_tissue;
-use super::hide_effects::hide_effects;
+use super::hide_effects::{hide_custom_effect, hide_effects};
 use super::misspecification_amounts::MisspecificationAmounts;
 use crate::simulator::rich_world::RichEffects;
 use crate::simulator::sensor_noise::SensorNoise;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
+use std::sync::Arc;
 
 /// Largest number of draws of a case whose effect misses the required strength.
 const ATTEMPTS: u64 = 6;
 
-/// Draws everything but the noise realisation.
+/// Draws everything but the noise realisation. `custom` are the effects of which a case with [`Hide::Custom`] hides one; without any it
+/// hides nothing.
 #[must_use]
-pub fn set_up_case(id: &CaseId) -> CaseSetup {
+pub fn set_up_case(id: &CaseId, custom: &[Arc<dyn CustomEffect>]) -> CaseSetup {
     let (low, high) = strength_range_sd(id.size);
     let mut kept: Option<(f64, CaseSetup)> = None;
     for attempt in 0..ATTEMPTS {
-        let setup = attempt_at(id, attempt);
+        let setup = attempt_at(id, custom, attempt);
         let drawn_with_number = setup.rich.foundation.is_some() || setup.rich.damage.is_some();
         let free = id.hide == Hide::Clean
             || drawn_with_number
@@ -46,7 +49,7 @@ pub fn set_up_case(id: &CaseId) -> CaseSetup {
             break;
         }
     }
-    kept.map_or_else(|| attempt_at(id, 0), |k| k.1)
+    kept.map_or_else(|| attempt_at(id, custom, 0), |k| k.1)
 }
 
 /// Least and largest strength of a size, in noise standard deviations.
@@ -59,7 +62,7 @@ pub fn strength_range_sd(size: Size) -> (f64, f64) {
     }
 }
 
-fn attempt_at(id: &CaseId, attempt: u64) -> CaseSetup {
+fn attempt_at(id: &CaseId, custom: &[Arc<dyn CustomEffect>], attempt: u64) -> CaseSetup {
     let mut rng = ChaCha8Rng::seed_from_u64(id.case_seed());
     rng.set_stream(1 + attempt);
     let amounts = MisspecificationAmounts::of(id.wrong, id.severity);
@@ -88,13 +91,18 @@ fn attempt_at(id: &CaseId, attempt: u64) -> CaseSetup {
         world: id.world,
         rich: RichEffects::default(),
         effects: Vec::new(),
+        custom: None,
         shape: None,
         strength_sd: 0.0,
     };
     let (low, high) = strength_range_sd(id.size);
     // Slightly inside the range, so that the last step of the search need not be exact.
     let target = log_uniform(&mut rng, 1.1 * low, 0.9 * high) * setup.noise.sd_n;
-    hide_effects(&mut rng, id, &mut setup, target);
+    if id.hide == Hide::Custom {
+        hide_custom_effect(&mut rng, id, custom, &mut setup, target);
+    } else {
+        hide_effects(&mut rng, id, &mut setup, target);
+    }
     if setup.amounts.guess > 1.0 {
         setup.assumed = draw_tissue::draw_guessed_tissue(&mut rng, &setup.assumed, &setup.amounts);
     }

@@ -2,6 +2,7 @@
 
 use super::case_definition::CaseSetup;
 use super::case_id::{CaseId, Hide, World};
+use super::custom_effect::CustomEffect;
 use super::draw_effect::{self, EffectContext};
 use super::effect_strength::{RefitTerms, max_force_n, unexplained_rms_n};
 use super::rich_world_effects::{self, RICH_EFFECTS};
@@ -10,6 +11,10 @@ use crate::simulator::effect::{Effect, IDS};
 use crate::simulator::rich_world::RichEffects;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
+use std::sync::Arc;
+
+/// Steps that scale an effect to its target strength.
+const SCALING_STEPS: usize = 5;
 
 /// Whether a tissue can have an effect: boundaries need two layers, puncture effects a layer that is punctured.
 fn fits(effect: &Effect, setup: &CaseSetup) -> bool {
@@ -67,7 +72,7 @@ pub fn hide_effects(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, ta
     }
     let count = match id.hide {
         Hide::One | Hide::Two | Hide::Three if id.world == World::Rich => 0,
-        Hide::Clean | Hide::Outside => 0,
+        Hide::Clean | Hide::Outside | Hide::Custom => 0,
         Hide::One | Hide::Mixed | Hide::Instrument => 1,
         Hide::Two => 2,
         Hide::Three => 3,
@@ -115,13 +120,38 @@ pub fn hide_effects(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, ta
     };
 }
 
+/// Hides one of the caller's effects, each equally often, with a residual of about `target_n` in N.
+pub(super) fn hide_custom_effect(
+    rng: &mut ChaCha8Rng,
+    id: &CaseId,
+    custom: &[Arc<dyn CustomEffect>],
+    setup: &mut CaseSetup,
+    target_n: f64,
+) {
+    if custom.is_empty() {
+        return;
+    }
+    let mut effect = custom[in_turn(id, custom.len())].drawn(&mut || rng.random());
+    let mut left_n = 0.0;
+    for _ in 0..=SCALING_STEPS {
+        setup.custom = Some(Arc::clone(&effect));
+        left_n = unexplained_rms_n(setup, &[], None, RefitTerms::Nothing);
+        let factor = (target_n / left_n.max(1e-9)).clamp(0.05, 20.0);
+        if (0.87..1.15).contains(&factor) {
+            break;
+        }
+        effect = effect.scaled(factor);
+    }
+    setup.strength_sd = left_n / setup.noise.sd_n;
+}
+
 /// Draws the rich-law effects of a case and scales them to the target strength.
 fn enrich(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, target_n: f64) {
     let count = match id.hide {
         Hide::One | Hide::Mixed => 1,
         Hide::Two => 2,
         Hide::Three => 3,
-        Hide::Clean | Hide::Outside | Hide::Instrument => 0,
+        Hide::Clean | Hide::Outside | Hide::Instrument | Hide::Custom => 0,
     };
     let truth = setup.truth.clone();
     let mut all = RichEffects::default();
@@ -130,7 +160,7 @@ fn enrich(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, target_n: f6
         let which = (in_turn(id, RICH_EFFECTS.len()) + turn) % RICH_EFFECTS.len();
         let mut one = RichEffects::default();
         rich_world_effects::add_rich_effect(rng, which, &truth, id.size, &mut one);
-        for _ in 0..5 {
+        for _ in 0..SCALING_STEPS {
             setup.rich = one;
             let left = unexplained_rms_n(setup, &[], None, RefitTerms::Nothing);
             let factor = (target_n / f64::from(count).sqrt() / left.max(1e-9)).clamp(0.05, 20.0);
@@ -161,7 +191,7 @@ pub fn hidden_name(name: &str) -> Option<&'static str> {
 #[must_use]
 pub fn intended_effect(id: &CaseId) -> Option<&'static str> {
     match id.hide {
-        Hide::Clean => None,
+        Hide::Clean | Hide::Custom => None,
         Hide::Outside => Some(UNMODELLED_SHAPES[in_turn(id, UNMODELLED_SHAPES.len())]),
         Hide::Instrument => Some(INSTRUMENT[in_turn(id, INSTRUMENT.len())]),
         _ if id.world == World::Rich => None,
@@ -195,7 +225,7 @@ fn shuffled(seed: u64, n: usize) -> Vec<usize> {
 /// Scales an effect to the target strength, as closely as plausible parameters allow.
 fn strengthened(setup: &CaseSetup, effect: Effect, target_n: f64, largest_n: f64) -> Effect {
     let mut effect = effect;
-    for _ in 0..5 {
+    for _ in 0..SCALING_STEPS {
         let left = unexplained_rms_n(setup, &[effect], None, RefitTerms::Nothing);
         let factor = (target_n / left.max(1e-9)).clamp(0.05, 20.0);
         if (0.87..1.15).contains(&factor) {
@@ -278,7 +308,7 @@ mod tests {
             };
             let (wrong, index) = first(what, n).expect("one of the cases");
             let id = id(wrong, hide, index);
-            let setup = set_up_case(&id);
+            let setup = set_up_case(&id, &[]);
             let hidden =
                 setup.effects.first().map(Effect::id).or(setup.shape.as_ref().map(UnmodelledShape::name));
             let wanted = if hide == Hide::One { IDS[what] } else { UNMODELLED_SHAPES[what] };

@@ -4,6 +4,7 @@ pub mod case_definition;
 pub mod case_id;
 pub mod case_recordings;
 pub mod case_setup;
+pub mod custom_effect;
 pub mod distinguishable_effects;
 pub mod draw_effect;
 pub mod draw_motion;

@@ -24,7 +24,7 @@ impl SecondInsertion {
     /// The tissue of a case, before any insertion.
     #[must_use]
     pub fn new(id: &CaseId) -> Self {
-        let mut setup = set_up_case(id);
+        let mut setup = set_up_case(id, &[]);
         setup.paths.clear();
         Self { id: *id, setup, made: Vec::new() }
     }

@@ -83,11 +83,15 @@ impl CaseOutcome {
             worth.correct = false;
         }
         let mut hidden: Vec<String> = case.setup.effects.iter().map(|e| e.id().to_owned()).collect();
+        hidden.extend(case.setup.custom.as_ref().map(|c| c.id().to_owned()));
         hidden.extend(rich_world_effects::names(&case.setup.rich).iter().map(|n| (*n).to_owned()));
         hidden.extend(case.setup.shape.as_ref().map(|s| s.name().to_owned()));
         let mut values = Vec::new();
         for e in &case.setup.effects {
             values.extend(e.parameters().into_iter().map(|(p, x)| (format!("{}.{p}", e.id()), x)));
+        }
+        if let Some(custom) = &case.setup.custom {
+            values.extend(custom.parameters().into_iter().map(|(p, x)| (format!("{}.{p}", custom.id()), x)));
         }
         let there = |name: &str| {
             expected.wanted.iter().any(|w| w.effect == name || w.also.iter().any(|a| a == name))
@@ -171,6 +175,16 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
                 e.high.map(|x| x + turn),
             );
             scored.label = answer.label(0, Some(effect.id()), &path);
+            out.push(scored);
+        }
+    }
+    if let Some(custom) = &case.setup.custom
+        && let Some(cause) = answer.causes.iter().find(|c| c.effect == custom.id())
+    {
+        for (path, truth) in custom.parameters() {
+            let Some(e) = cause.parameters.get(&path) else { continue };
+            let mut scored = number(format!("{}.{path}", custom.id()), truth, e.value, e.low, e.high);
+            scored.label = answer.label(0, Some(custom.id()), &path);
             out.push(scored);
         }
     }

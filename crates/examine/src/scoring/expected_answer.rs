@@ -103,6 +103,10 @@ pub fn expected_answer(id: &CaseId, setup: &CaseSetup) -> Expected {
     for effect in &setup.effects {
         out.wanted.push(expected_cause(effect, setup));
     }
+    if let Some(custom) = &setup.custom {
+        let effect = custom.id().to_owned();
+        out.wanted.push(ExpectedCause { effect, also: Vec::new(), may_be_silent: false, unseen: false });
+    }
     let a = &setup.amounts;
     // Rule 12.
     out.layers = (!a.has_scenario).then_some(setup.truth.layers.len());

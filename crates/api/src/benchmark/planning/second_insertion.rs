@@ -99,7 +99,7 @@ fn diagnose_twice(id: &CaseId, case: &mut PlanningCase) -> Result<(), String> {
     let second = |path: MotionPath| -> Result<SecondDiagnosis, String> {
         let mut second = first.clone();
         second.add_insertion(path).map_err(|e| e.to_string())?;
-        let answer = answer_question(&second.question())?;
+        let answer = answer_question(&second.question(), &[])?;
         Ok(summarise(&second, &answer, &case.hidden))
     };
     let path = path_of(&plan.motion).ok_or_else(|| "the plan is no program".to_owned())?;
