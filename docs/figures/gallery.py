@@ -126,7 +126,7 @@ def verdict(diagnosis, effect="", absorbed=False):
             parts.append(names + f" ({values})" * with_values + f", confidence {cause['confidence']:.2g}")
         return f"{diagnosis['verdict']}: {' + '.join(parts)}; {grade(diagnosis)}"
 
-    return next((text for text in (line(True), line(False)) if len(text) <= CAPTION), line(False))
+    return line(True) if len(line(True)) <= CAPTION else line(False)
 
 
 def before_and_after(before, after, named):

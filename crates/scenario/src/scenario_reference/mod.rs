@@ -224,11 +224,16 @@ fn custom_section(examples: &str) -> String {
     let outline = RonOutline::new(examples);
     let text = |path: &str| outline.locate(path).and_then(|entry| examples.get(entry.start..entry.end));
     for k in 0.. {
-        let (Some(effect), Some(name)) = (text(&format!("[{k}]")), text(&format!("[{k}].name"))) else { break };
+        let (Some(effect), Some(name)) = (text(&format!("[{k}]")), text(&format!("[{k}].name"))) else {
+            break;
+        };
         let name = name.trim_matches('"');
         // The list indents its entries by four spaces.
         let lines = effect.replace("\n    ", "\n");
-        let _ = writeln!(section, "\n### {name}\n\n```ron\n{lines},\n```\n\n![{name}](../figures/effects/{name}.svg)");
+        let _ = writeln!(
+            section,
+            "\n### {name}\n\n```ron\n{lines},\n```\n\n![{name}](../figures/effects/{name}.svg)"
+        );
     }
     section
 }

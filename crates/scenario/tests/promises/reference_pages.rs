@@ -10,7 +10,8 @@ const END: &str = "<!-- end of generated -->";
 
 /// The text of a file of the repository; empty if there is none.
 fn read(name: &str) -> String {
-    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(name)).unwrap_or_default()
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(name))
+        .unwrap_or_default()
 }
 
 /// Compares a file of `docs` with what it should contain, or writes it.
