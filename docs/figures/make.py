@@ -5,12 +5,11 @@
     python3 docs/figures/make.py STYLET --reports  # also the pictures of reports (needs playwright and pillow)
     STYLET_MEASURED=/folder python3 docs/figures/make.py STYLET --measured  # also measured.svg (minutes; an absolute path)
 
-Writes into the folder of this file: one picture per effect (effects/NAME.svg), the moving first picture (needle.svg), the figures of runs and
+Writes into the folder of this file: one picture per effect (effects/NAME.svg) and failure (failures/NAME.svg), the moving first picture (needle.svg), the figures of runs and
 diagnoses with fewer points, and with --reports the pictures in report/. Figures that take minutes are made by the commands named on their pages.
 """
 
 import csv
-import html
 import json
 import re
 import subprocess
@@ -19,28 +18,12 @@ import tempfile
 from pathlib import Path
 
 sys.dont_write_bytecode = True
+from drawing import BLUE, FONT, GREY, INK, LINE, ORANGE, SOFT, path  # noqa: E402
+import gallery  # noqa: E402
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
-INK, SOFT, LINE, BLUE, GREY, ORANGE = "#1b1f24", "#5a636d", "#d9dde2", "#0072b2", "#9aa3ad", "#d55e00"
-FONT = "system-ui,-apple-system,'Segoe UI',Roboto,'Helvetica Neue',Arial,'DejaVu Sans',sans-serif"
 LAYERS = ["#56b4e9", "#e69f00", "#009e73"]
-
-PHANTOM = """Scenario(
-    name: "two gels",
-    tissue: (layers: [
-        (thickness_m: 0.02, stiffness_n_per_m: 50.0, friction_ns_per_m2: 3000.0, puncture_n: 0.8),
-        (thickness_m: 0.04, stiffness_n_per_m: 60.0, friction_ns_per_m2: 4000.0, puncture_n: 1.8),
-    ]),
-    EFFECTS
-    motion: Program(start_m: -0.005, segments: [
-        Move(velocity_mps: 0.004, duration_s: 7.5), Hold(duration_s: 3.0),
-        Ripple(velocity_mps: 0.004, amplitude_mps: 0.002, frequency_hz: 0.5, duration_s: 5.0), Move(velocity_mps: 0.006, duration_s: 2.0),
-        Move(velocity_mps: -0.006, duration_s: 10.0),
-    ]),
-    robot: Replay,
-    sensor: ForceTorque(noise_n: 0.0),
-)
-"""
 
 
 class Stylet:
@@ -63,136 +46,6 @@ class Stylet:
         with open(self.folder / name / "recording.csv") as file:
             rows = list(csv.DictReader(file))
         return {key: [float(r[key]) if r[key] else 0.0 for r in rows] for key in rows[0]}
-
-
-def thin(points, tolerance):
-    """Douglas-Peucker: the polyline with fewer points, each within `tolerance` of it."""
-    if len(points) < 3:
-        return points
-    keep, stack = {0, len(points) - 1}, [(0, len(points) - 1)]
-    while stack:
-        a, b = stack.pop()
-        (x0, y0), (x1, y1) = points[a], points[b]
-        length = ((x1 - x0) ** 2 + (y1 - y0) ** 2) ** 0.5
-        worst, at = 0.0, None
-        for k in range(a + 1, b):
-            x, y = points[k]
-            d = abs((x1 - x0) * (y0 - y) - (x0 - x) * (y1 - y0)) / length if length else ((x - x0) ** 2 + (y - y0) ** 2) ** 0.5
-            if d > worst:
-                worst, at = d, k
-        if at is not None and worst > tolerance:
-            keep.add(at)
-            stack += [(a, at), (at, b)]
-    return [points[k] for k in sorted(keep)]
-
-
-def path(points, tolerance=0.25):
-    return "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in thin(points, tolerance))
-
-
-def ticks(low, high, wanted=4):
-    step = next(s for e in range(-6, 6) for s in (1 * 10.0**e, 2 * 10.0**e, 5 * 10.0**e) if (high - low) / s <= wanted)
-    first = int(low / step) - 1
-    return [k * step for k in range(first, first + wanted + 4) if low - 1e-9 <= k * step <= high + 1e-9]
-
-
-def panel(series, x_label, y_label, left, width, height):
-    """Curves (colour, x, y) over common axes."""
-    top, bottom, right = 34, 36, left + width
-    xs, ys = [v for s in series for v in s[1]], [v for s in series for v in s[2]]
-    x0, x1, y0, y1 = min(xs), max(xs), min(ys), max(ys)
-    pad = max(0.05 * (y1 - y0), 0.01)
-    y0, y1 = y0 - pad, y1 + pad
-    px = lambda x: left + (x - x0) / (x1 - x0) * width
-    py = lambda y: height - bottom - (y - y0) / (y1 - y0) * (height - top - bottom)
-    out = []
-    for x in ticks(x0, x1, 8):
-        out.append(f'<path d="M{px(x):.1f} {top}V{height - bottom}" stroke="{LINE}"/><text x="{px(x):.1f}" y="{height - bottom + 14}" text-anchor="middle">{x:g}</text>')
-    for y in ticks(y0, y1):
-        out.append(f'<path d="M{left} {py(y):.1f}H{right}" stroke="{LINE}"/><text x="{left - 6}" y="{py(y) + 4:.1f}" text-anchor="end">{y:g}</text>')
-    out.append(f'<text x="{left + width / 2}" y="{height - 6}" text-anchor="middle">{x_label}</text>')
-    out.append(f'<text transform="translate({left - 38} {(top + height - bottom) / 2}) rotate(-90)" text-anchor="middle">{y_label}</text>')
-    for colour, x, y in series:
-        out.append(f'<path d="{path([(px(a), py(b)) for a, b in zip(x, y)])}" stroke="{colour}" stroke-width="1.6"/>')
-    return out
-
-
-def effect_figure(title, base, effect, over_depth):
-    """Force with and without the effect, and their difference."""
-    width, height = 760, 200
-    name = "depth (mm)" if over_depth else "time (s)"
-    curves = []
-    for data in (base, effect):
-        x, y = data["time_s"], data["force_n"]
-        if over_depth:
-            end = data["position_m"].index(max(data["position_m"])) + 1
-            x, y = [1e3 * z for z in data["position_m"][:end]], y[:end]
-        curves.append((x, y))
-    (x0, y0), (x1, y1) = curves
-    k, gap = 0, []
-    for x, y in zip(x1, y1):
-        while k + 1 < len(x0) and x0[k + 1] <= x:
-            k += 1
-        gap.append(y - y0[k])
-    out = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" viewBox="0 0 {width} {height}" role="img" aria-label="{html.escape(title)}">',
-        f'<style>text{{font:11.5px {FONT};fill:{SOFT}}}.h{{font-size:13px;font-weight:600;fill:{INK}}}path{{fill:none;stroke-linejoin:round}}</style>',
-        f'<rect width="{width}" height="{height}" fill="#fff"/><text class="h" x="50" y="20">{html.escape(title)}</text>',
-        f'<path d="M560 16h14" stroke="{GREY}" stroke-width="2.5"/><text x="578" y="20">base law</text><path d="M645 16h14" stroke="{BLUE}" stroke-width="2.5"/><text x="663" y="20">with the effect</text>',
-        *panel([(GREY, x0, y0), (BLUE, x1, y1)], name, "force (N)", 50, 340, height),
-        *panel([(BLUE, x1, gap)], name, "difference (N)", 450, 300, height),
-    ]
-    return "\n".join(out) + "\n</svg>\n"
-
-
-# Over depth where the effect moves a place, or acts on the recorded position.
-OVER_DEPTH = {"boundary_shift", "position_scale"}
-# Sizes other than the typical one, where that would hardly be visible in a small picture.
-VISIBLE = {
-    "quantisation": ("step_n", "0.25"),
-    "tool_inertia": ("mass_kg", "3.0"),
-    "time_delay": ("delay_s", "0.3"),
-    "low_pass_lag": ("time_constant_s", "0.5"),
-    "position_scale": ("eps", "0.1"),
-    "force_bias": ("force_n", "0.3"),
-    "force_drift": ("rate_n_per_s", "0.02"),
-    "force_gain": ("eps", "0.2"),
-    "periodic_interference": ("frequency_hz", "0.5"),
-    "saturation": ("limit_n", "1.2"),
-    "loading_hysteresis": ("fraction", "0.6"),
-    "respiration": ("amplitude_m", "0.001"),
-    "needle_compliance": ("stiffness_n_per_m", "300.0"),
-    "rate_dependent_puncture": ("alpha", "0.3"),
-    "position_dependent_force": ("stiffness_n_per_m", "10.0"),
-}
-
-
-# Effects that need another phantom or motion to act.
-CHANGED = {
-    "deep_indentation": [("puncture_n: 0.8", "puncture_n: 1.3")],
-    "loading_hysteresis": [("Move(velocity_mps: 0.004, duration_s: 7.5)", "Move(velocity_mps: 0.004, duration_s: 4.0), Move(velocity_mps: -0.004, duration_s: 1.0), Move(velocity_mps: 0.004, duration_s: 4.5)")],
-}
-
-
-def effects(stylet):
-    folder = HERE / "effects"
-    folder.mkdir(exist_ok=True)
-    base = stylet.run("base", PHANTOM.replace("EFFECTS", ""))
-    page = (ROOT / "docs/reference/effects.md").read_text()
-    for name, block in re.findall(r"^### (\w+)\n(.*?)(?=^##|\Z)", page, re.S | re.M):
-        line = re.search(r"```ron\n(.*?),\n```", block, re.S).group(1)
-        if name in VISIBLE:
-            field, value = VISIBLE[name]
-            line, changed = re.subn(rf"\b{field}: [-0-9.e]+", f"{field}: {value}", line)
-            assert changed, (name, line)
-        phantom = PHANTOM
-        for old, new in CHANGED.get(name, []):
-            assert old in phantom
-            phantom = phantom.replace(old, new)
-        without = stylet.run(f"{name}-without", phantom.replace("EFFECTS", "")) if name in CHANGED else base
-        with_effect = stylet.run(name, phantom.replace("EFFECTS", f"effects: [{line}],"))
-        title = line if len(line) < 62 else name
-        (folder / f"{name}.svg").write_text(effect_figure(title, without, with_effect, name in OVER_DEPTH))
 
 
 def moving_needle(stylet):
@@ -309,7 +162,8 @@ if __name__ == "__main__":
         sys.exit(__doc__)
     with tempfile.TemporaryDirectory() as folder:
         command = Stylet(sys.argv[1], folder)
-        effects(command)
+        gallery.effects(command)
+        gallery.failures(command)
         moving_needle(command)
         figures_of_commands(command)
         if "--measured" in sys.argv:

@@ -162,13 +162,16 @@ pub fn effects_by_stage() -> String {
     })
 }
 
-/// `docs/reference/effects.md`: every effect with equation, source, signature, parameters and a line to paste.
+/// `docs/reference/effects.md`: every effect with equation, source, signature, parameters and a line to paste, then the `examples` of custom effects,
+/// the text of a list of `Custom(...)`.
 #[must_use]
-pub fn effects_page() -> String {
+pub fn effects_page(examples: &str) -> String {
     let mut page = "# Effects reference\n\n\
         An effect is `coulomb_friction` in outputs and on the command line, `CoulombFriction` in the list `effects: [...]` of a scenario. Per effect: equation\n\
-        ([symbols](model.md#symbols-and-signs)), a line to paste, parameters (*inactive*: the value without effect, *typical*: where a fit starts), the force of one insertion without and\n\
-        with it, how to recognise it, and a source. Pictures and lines may have another size than the typical one. This page is generated. [Custom effects](../how-to/custom_effects.md) are formulas of your own.\n\n"
+        ([symbols](model.md#symbols-and-signs)), a line to paste, parameters (*inactive*: the value without effect, *typical*: where a fit starts), pictures, how to recognise it, and *a source*.\n\
+        Pictures and lines may have another size than the typical one. This page is generated.\n\n\
+        Pictures: the force without and with the effect; a recording (noise 0.01 N) less the simulation without it; the same recording less the simulation of\n\
+        the `extended.ron` that `stylet diagnose` wrote from it and one of another motion, with the verdict. Single spikes at ruptures are a sample of timing.\n\n"
         .to_owned();
     let mut heading = "General effects";
     let _ = writeln!(page, "## {heading}\n");
@@ -201,15 +204,38 @@ pub fn effects_page() -> String {
         }
         let _ = writeln!(
             page,
-            "\n![{}](../figures/effects/{}.svg)\n\n{} Source: {}.\n",
+            "\n![{}](../figures/effects/{}.svg)\n\n{} *{}.*\n",
             info.id,
             info.id,
             info.signature,
             info.source.trim_end_matches('.')
         );
     }
+    page += &custom_section(examples);
     page.truncate(page.trim_end().len());
     page + "\n"
+}
+
+/// The custom effects in the text of a list, each as it stands there, with its picture.
+fn custom_section(examples: &str) -> String {
+    let mut section = "## Custom effects\n\n\
+        [Formulas](../how-to/custom_effects.md) from `scenarios/effects/examples.ron`, diagnosed with `--effects` and that file.\n"
+        .to_owned();
+    let outline = RonOutline::new(examples);
+    let text = |path: &str| outline.locate(path).and_then(|entry| examples.get(entry.start..entry.end));
+    for k in 0.. {
+        let (Some(effect), Some(name)) = (text(&format!("[{k}]")), text(&format!("[{k}].name"))) else {
+            break;
+        };
+        let name = name.trim_matches('"');
+        // The list indents its entries by four spaces.
+        let lines = effect.replace("\n    ", "\n");
+        let _ = writeln!(
+            section,
+            "\n### {name}\n\n```ron\n{lines},\n```\n\n![{name}](../figures/effects/{name}.svg)"
+        );
+    }
+    section
 }
 
 /// The variables in the formulas of custom effects: the table in `docs/how-to/custom_effects.md`.

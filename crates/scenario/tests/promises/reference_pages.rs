@@ -8,6 +8,12 @@ use stylet_scenario::{custom_variables, effects_by_stage, effects_page, scenario
 const BEGIN: &str = "<!-- generated -->\n";
 const END: &str = "<!-- end of generated -->";
 
+/// The text of a file of the repository; empty if there is none.
+fn read(name: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(name))
+        .unwrap_or_default()
+}
+
 /// Compares a file of `docs` with what it should contain, or writes it.
 fn compare(name: &str, expected: impl Fn(&str) -> String) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs").join(name);
@@ -30,7 +36,7 @@ fn with_table(page: &str, table: &str) -> String {
 #[test]
 fn the_reference_pages_are_those_of_the_schema() {
     compare("reference/scenario.md", |_| scenario_page());
-    compare("reference/effects.md", |_| effects_page());
+    compare("reference/effects.md", |_| effects_page(&read("scenarios/effects/examples.ron")));
     compare("reference/model.md", |page| with_table(page, &effects_by_stage()));
     compare("how-to/custom_effects.md", |page| with_table(page, &custom_variables()));
 }

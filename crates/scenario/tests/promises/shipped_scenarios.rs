@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::path::{Path, PathBuf};
-use stylet_scenario::{Motion, Scenario};
+use stylet_scenario::{Motion, Scenario, load_effects};
 use stylet_tissue::{ForceLaw, ForceLawState, Rupture};
 
 /// File; time (s) and released elastic force (N) of each true rupture; largest force (N).
@@ -27,6 +27,11 @@ fn folder() -> PathBuf {
 
 fn load(name: &str) -> Scenario {
     Scenario::load(&folder().join(format!("{name}.ron"))).unwrap_or_else(|e| panic!("{e}"))
+}
+
+#[test]
+fn the_example_effects_load() {
+    assert_eq!(load_effects(&folder().join("effects/examples.ron")).unwrap().len(), 4);
 }
 
 #[derive(Default)]
