@@ -130,7 +130,7 @@ pub(crate) fn diagnose_given_layers(
     } else {
         progress("predicting held-out recordings");
         let base = held_out_residuals(&search.base, &search.data);
-        let same = search.best.model.effects.is_empty();
+        let same = search.best.model.effects.is_empty() && search.best.model.zero_step_count() == 0;
         let extended = if same { base.clone() } else { held_out_residuals(&search.best, &search.data) };
         (base, extended)
     };

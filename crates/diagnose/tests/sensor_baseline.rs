@@ -100,6 +100,16 @@ fn recordings_may_have_steps_at_different_times_and_other_offsets() {
 }
 
 #[test]
+fn held_out_recordings_are_predicted_with_their_own_steps() {
+    let data = [5, 6].map(|seed| insertion(seed, |t, _| if t >= 6.0 { 0.5 } else { 0.0 }));
+    let scenario = Scenario::parse("assumed.ron", ASSUMED).expect("a scenario");
+    let found = diagnose(&scenario, &data, &Options::default(), |_| {}).expect("a diagnosis").diagnosis;
+    assert_eq!(names(&found), ["zero_step"]);
+    let gain = &found.gain;
+    assert!(gain.rmse_before_n > 5.0 * gain.floor_n && gain.rmse_after_n < 1.2 * gain.floor_n, "{gain:?}");
+}
+
+#[test]
 fn a_clean_insertion_has_no_baseline() {
     let d = diagnosed(&[insertion(9, |_, _| 0.0)]);
     assert_eq!((d.verdict, names(&d)), (Verdict::None, vec![]));
