@@ -116,15 +116,12 @@ pub struct BenchmarkDiagnoseArgs {
 
 Writes README.md (the task), names.txt (admissible names) and cases/NNNN with assumed.ron and the
 recordings as CSV. The hidden effects are in DIR.key.json next to the folder. Keep this key and the seed
-secret: the seed reproduces the cases.
+secret.
 
-With --online: streams/NNNN.csv for online detection of punctures, their rates in streams.csv, and the key;
-for `--split make` also truth.csv; with --parquet also streams/NNNN.parquet. Different splits and seeds give
-independent streams.
-
---measured adds the insertions of a data set (files relative to the folder in the variable STYLET_MEASURED) as
-the row `measured`; `--cases 0` exports these alone. Their true punctures are unknown: the reference is clear
-falls of the force, defined in README.md and listed in the key.")]
+With --online: streams/NNNN.csv for online detection of punctures (with --parquet also .parquet), their rates
+in streams.csv, and the key; for `--split make` also truth.csv. Different splits and seeds give independent
+streams. --measured adds the insertions of a data set as the row `measured` (with `--cases 0` nothing else):
+their reference is falls of the force, defined in README.md and listed in the key.")]
 pub struct BenchmarkExportArgs {
     #[command(flatten)]
     pub cases: CaseArgs,
@@ -137,7 +134,7 @@ pub struct BenchmarkExportArgs {
     /// With --online: `make` for choosing a detector's settings, `judge` for judging it.
     #[arg(long, value_name = "WORD", default_value = "judge", requires = "online")]
     pub split: String,
-    /// With --online: also write the streams as Parquet, to the last bit as CSV.
+    /// With --online: also write the streams as Parquet, with the same numbers.
     #[arg(long, requires = "online")]
     pub parquet: bool,
     /// With --online: data set (RON) whose insertions form the row `measured`.
