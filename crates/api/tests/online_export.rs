@@ -50,18 +50,11 @@ impl Drop for Scratch {
 }
 
 fn export(rows: &[String]) -> OnlineExport<'_> {
-    OnlineExport {
-        world: "plain",
-        rows,
-        split: "judge",
-        cases: 1,
-        seed: 11,
-        measured: None,
-        parquet: false,
-    }
+    OnlineExport { world: "plain", rows, split: "judge", cases: 1, seed: 11, measured: None, parquet: false }
 }
 
 /// At 100 Hz: 2 mm/s for 8 s, a hold, and back. From 2 s on the force rises by 0.3 N/mm; it falls by 1.5 N at 5 s and by 0.2 N at 7 s.
+/// Pulled back, the friction changes its sign over 1 mm.
 fn recording() -> String {
     let mut text = String::from("time,fx,fy,fz,tx,ty,tz,px,py,pz\n");
     for k in 0..2000 {
@@ -69,7 +62,8 @@ fn recording() -> String {
         let mm = 2.0 * t.min(8.0).min(18.0 - t.max(10.0));
         let fallen = if t >= 5.0 { 1.5 } else { 0.0 } + if t >= 7.0 { 0.2 } else { 0.0 };
         let inside = 0.3 * (mm - 4.0).max(0.0);
-        let force = if t < 10.0 { inside - fallen } else { -0.1 * inside };
+        let back = ((t - 10.0) / 0.5).clamp(0.0, 1.0);
+        let force = (1.0 - back) * (inside - fallen) - back * 0.1 * inside;
         // The last digit of the noise of a sensor.
         let noise = 0.002 * f64::from(k % 5 - 2);
         let _ = writeln!(text, "{},0,0,{},0,0,0,0,0,{mm}", 10_000 * k, force + noise);

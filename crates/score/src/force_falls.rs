@@ -81,11 +81,11 @@ pub struct ReferenceFalls {
     pub minor: Vec<ForceFall>,
 }
 
-/// The falls until the needle is pulled back.
+/// The falls that end before the needle is pulled back, where the friction changes its sign.
 #[must_use]
 pub fn reference_falls(recording: &Recording) -> ReferenceFalls {
     let turn = deepest_samples(&recording.position_m).map_or(0, |(_, last)| last);
-    let of = |ratio| force_falls(recording, ratio, 1.0).into_iter().filter(|fall| fall.at < turn);
+    let of = |ratio| force_falls(recording, ratio, 1.0).into_iter().filter(|fall| fall.lowest < turn);
     let clear: Vec<ForceFall> = of(1.0).filter(|fall| fall.ratio >= CLEAR_FALL_RATIO).collect();
     let apart = |fall: &ForceFall| clear.iter().all(|c| fall.lowest < c.from || c.lowest < fall.from);
     let minor = of(MINOR_FALL_RATIO).filter(apart).collect();
@@ -115,8 +115,8 @@ mod tests {
             .iter()
             .map(|t| {
                 let fallen = [(2.0, 1.0), (3.0, 0.2), (4.0, 0.05)].iter().filter(|(at, _)| t >= at);
-                // Pulled back, the friction changes its sign.
-                let turned = if *t > 5.0 { 2.0 } else { 0.0 };
+                // Pulled back, the friction changes its sign over 1 mm.
+                let turned = 4.0 * (t - 5.0).clamp(0.0, 0.5);
                 0.5 * t - fallen.map(|(_, size)| size).sum::<f64>() - turned
             })
             .collect();

@@ -203,8 +203,8 @@ fn readme(count: usize, export: &StreamExport) -> String {
     });
     let measured = export.measured.map_or_else(String::new, |row| {
         format!(
-            "\n{} streams are recordings of real insertions (`--measured`): pass them on only as their owner allows. Their true punctures are \
-             unknown. {}\n",
+            "\n{} streams are recordings of real insertions (`--measured`), without rows of repeated or backward time stamps: pass them on only as
+their owner allows. Their true punctures are unknown. {}\n",
             row.streams.len(),
             row.derivation
         )
