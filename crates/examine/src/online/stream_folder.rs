@@ -37,13 +37,16 @@ struct MeasuredKey {
     streams: BTreeMap<String, MeasuredReference>,
 }
 
+/// Encodes samples of time in s, position in m and force in N; the path is for errors.
+pub type EncodeSamples = fn(&[[f64; 3]], &Path) -> Result<Vec<u8>, RecordError>;
+
 /// A file format of the streams in addition to CSV.
 #[derive(Clone, Copy, Debug)]
 pub struct StreamFormat {
     /// Ending of the file names.
     pub ending: &'static str,
-    /// Encodes samples of time in s, position in m and force in N; the path is for errors.
-    pub encode: fn(&[[f64; 3]], &Path) -> Result<Vec<u8>, RecordError>,
+    /// Encoder.
+    pub encode: EncodeSamples,
 }
 
 /// Streams to be exported.
