@@ -39,13 +39,14 @@ class Bench:
             raise SystemExit(f"stylet benchmark {' '.join(map(str, arguments))} failed:\n{run.stderr}")
         return run.stdout
 
-    def export(self, split, cases, seed, world="plain"):
+    def export(self, split, cases, seed, world="plain", measured=None):
         """Writes the streams; the key to them goes to a file beside their folder."""
         if self.streams.exists():
             shutil.rmtree(self.streams)
         self.streams.with_name("set.key.json").unlink(missing_ok=True)
         self.out.mkdir(parents=True, exist_ok=True)
-        self.call("export", "--online", "--world", world, "--split", split, "--cases", cases, "--seed", seed, "--out", self.streams)
+        recordings = ["--measured", measured] if measured else []
+        self.call("export", "--online", "--world", world, "--split", split, "--cases", cases, "--seed", seed, *recordings, "--out", self.streams)
 
     def folder(self, label):
         return self.out / "answers" / label

@@ -22,6 +22,7 @@ def main():
     parser.add_argument("--seed", type=int, default=2)
     parser.add_argument("--split", default="judge")
     parser.add_argument("--world", default="plain", help="plain or rich")
+    parser.add_argument("--measured", help="data set whose insertions form the row `measured`")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("target/online-benchmark"))
     parser.add_argument("--env", type=pathlib.Path, default=pathlib.Path("target/peers-online"))
     parser.add_argument("--entrants", help="only these, with commas between")
@@ -32,7 +33,7 @@ def main():
     if set(names) - set(OWN):
         subprocess.run([HERE / "setup.sh", options.env.resolve()], check=True)
     bench = Bench(options.stylet, options.env, options.out)
-    bench.export(options.split, options.cases, options.seed, options.world)
+    bench.export(options.split, options.cases, options.seed, options.world, options.measured)
 
     def answer(name):
         if name in OWN:

@@ -11,54 +11,7 @@ use rand_distr::{Distribution, StandardNormal};
 use std::path::PathBuf;
 use stylet_core::config::{Algorithm, EnhanceConfig};
 use stylet_record::{Column, ColumnMap, ReadOptions, Recording, differentiate, read_csv};
-use stylet_score::Trace;
-
-#[derive(Clone, Copy)]
-struct Fall {
-    from: usize,
-    at: usize,
-    size: f64,
-    ratio: f64,
-}
-
-/// Falls of at least 0.3 N (times scale) and 8 % of the peak so far within 0.1 s.
-fn falls(r: &Recording, share: f64, scale: f64) -> Vec<Fall> {
-    let (t, f) = (&r.time_s, &r.force_n);
-    let n = t.len();
-    let mut out = Vec::new();
-    let (mut k, mut peak) = (0, 0.0f64);
-    let lowest = |k: usize| {
-        let mut m = k;
-        let mut j = k;
-        while j < n && t[j] <= t[k] + 0.1 {
-            if f[j] < f[m] {
-                m = j;
-            }
-            j += 1;
-        }
-        m
-    };
-    while k < n {
-        peak = peak.max(f[k]);
-        let m = lowest(k);
-        let need = share * (0.3 * scale).max(0.08 * peak);
-        if f[k] - f[m] >= need {
-            let at = (k..=m).find(|&i| f[k] - f[i] >= need).unwrap_or(m);
-            let mut best = (f[k] - f[m], k, m);
-            for i in k..m {
-                let j = lowest(i);
-                if f[i] - f[j] > best.0 {
-                    best = (f[i] - f[j], i, j);
-                }
-            }
-            out.push(Fall { from: k, at, size: best.0, ratio: share * best.0 / need });
-            k = best.2 + 1;
-        } else {
-            k += 1;
-        }
-    }
-    out
-}
+use stylet_score::{CLEAR_FALL_RATIO, ForceFall, MINOR_FALL_RATIO, Trace, deepest_samples, force_falls};
 
 fn rms(v: impl Iterator<Item = f64>) -> f64 {
     let (mut n, mut s) = (0.0, 0.0);
@@ -133,16 +86,13 @@ fn main() {
             r.force_n = keep(&r.force_n);
         }
         r.velocity_mps = differentiate(&r.time_s, &r.position_m, 0.05);
-        let end_z = r.position_m.iter().fold(f64::NEG_INFINITY, |m, z| m.max(*z)) - 5e-5;
-        let there = |z: &f64| *z >= end_z;
-        let (Some(stop), Some(turn)) =
-            (r.position_m.iter().position(there), r.position_m.iter().rposition(there))
-        else {
+        let Some((stop, turn)) = deepest_samples(&r.position_m) else {
             eprintln!("{name}: no position");
             continue;
         };
-        let all: Vec<Fall> = falls(&r, 1.0, scale).into_iter().filter(|f| f.at < turn).collect();
-        let less: Vec<Fall> = falls(&r, 0.4, scale).into_iter().filter(|f| f.at < turn).collect();
+        let falls = |ratio| force_falls(&r, ratio, scale).into_iter().filter(|f| f.at < turn);
+        let all: Vec<ForceFall> = falls(1.0).collect();
+        let less: Vec<ForceFall> = falls(MINOR_FALL_RATIO).collect();
         let mut noisy = r.clone();
         let mut w = 0.0;
         for f in &mut noisy.force_n {
@@ -158,7 +108,7 @@ fn main() {
         let mut line = String::new();
         for f in &all {
             n_falls += 1;
-            let large = f.ratio >= 1.25;
+            let large = f.ratio >= CLEAR_FALL_RATIO;
             big += usize::from(large);
             let (from, at) = (r.time_s[f.from], r.time_s[f.at]);
             let hit = trace
@@ -176,7 +126,7 @@ fn main() {
                 None => {
                     line += &format!(
                         "\n    missed {:.2} N ({:.2}) at {:.3} s {:.2} mm v {:.2}",
-                        f.size,
+                        f.size_n,
                         f.ratio,
                         at,
                         1e3 * r.position_m[f.at],
@@ -207,7 +157,7 @@ fn main() {
                 d.time_s,
                 1e3 * d.position_m,
                 r.force_n[i],
-                small.map_or(0.0, |f| f.size)
+                small.map_or(0.0, |f| f.size_n)
             );
         }
         if name.starts_with("skin") {

@@ -5,6 +5,7 @@
 mod contact_finding;
 mod enhancement_trace;
 mod enhancer_with_model;
+mod force_falls;
 mod found_layers;
 mod measured_score;
 mod offline_least_squares;
@@ -16,6 +17,10 @@ pub use contact_finding::{ContactAssessor, ContactFinding, ContactHypothesis};
 pub use enhancement_trace::{Trace, algorithm_name, coefficients, model_name, score_run};
 pub use enhancer_with_model::{
     EnhancerWithModel, MAX_STORED_SAMPLES, RecordingScale, enhancer_for, enhancer_in_units,
+};
+pub use force_falls::{
+    CLEAR_FALL_RATIO, ForceFall, MINOR_FALL_RATIO, ReferenceFalls, deepest_samples, describe_reference_falls,
+    force_falls, reference_falls,
 };
 pub use found_layers::{FoundLayer, MIN_FORCE_SHARE, found_layers};
 pub use measured_score::{MeasuredRecording, MeasuredScore, ModelFrictionScore};

@@ -118,13 +118,16 @@ pub struct BenchmarkDiagnoseArgs {
   stylet benchmark export --wrong thickness,encoder --severity large --cases 30 --seed 20261 --out out/challenge
   stylet benchmark export --online --rows all --cases 100 --seed 20261 --out out/streams
   stylet benchmark export --online --rows hand_held,hold --split make --cases 30 --out out/make
+  stylet benchmark export --online --cases 0 --measured scenarios/measured/skin_on_muscle.ron --out out/measured
 
 Writes README.md (the task), names.txt (admissible names) and cases/NNNN with assumed.ron and the
 recordings as CSV. The hidden effects are in DIR.key.json next to the folder. Keep this key and the seed
-secret: the seed reproduces the cases.
+secret.
 
-With --online: streams/NNNN.csv for online detection of punctures, their rates in streams.csv, and the key;
-for `--split make` also truth.csv. Different splits and seeds give independent streams.")]
+With --online: streams/NNNN.csv for online detection of punctures (with --parquet also .parquet), their rates
+in streams.csv, and the key; for `--split make` also truth.csv. Different splits and seeds give independent
+streams. --measured adds the insertions of a data set as the row `measured` (with `--cases 0` nothing else):
+their reference is falls of the force, defined in README.md and listed in the key.")]
 pub struct BenchmarkExportArgs {
     #[command(flatten)]
     pub cases: CaseArgs,
@@ -137,6 +140,12 @@ pub struct BenchmarkExportArgs {
     /// With --online: `make` for choosing a detector's settings, `judge` for judging it.
     #[arg(long, value_name = "WORD", default_value = "judge", requires = "online")]
     pub split: String,
+    /// With --online: also write the streams as Parquet, with the same numbers.
+    #[arg(long, requires = "online")]
+    pub parquet: bool,
+    /// With --online: data set (RON) whose insertions form the row `measured`.
+    #[arg(long, value_name = "DATASET", requires = "online")]
+    pub measured: Option<PathBuf>,
     /// Folder for the challenge; it must not exist yet.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,

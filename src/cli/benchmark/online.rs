@@ -5,9 +5,9 @@ use crate::cli::exit_codes::Failure;
 use crate::cli::progress_bar::Progress;
 use crate::cli::terminal_output::print;
 use std::path::PathBuf;
-use stylet_api::benchmark::{Player, judge_online, online_files, online_streams, replay_streams};
+use stylet_api::benchmark::{OnlineExport, Player, judge_online, online_files, replay_streams};
 use stylet_examine::challenge_export::key_path;
-use stylet_examine::online::stream_folder::{export_streams, exported_streams};
+use stylet_examine::online::stream_folder::exported_streams;
 use stylet_examine::online::stream_scores::scores_text;
 
 /// Writes streams without the truth, and their key.
@@ -16,8 +16,16 @@ use stylet_examine::online::stream_scores::scores_text;
 /// [`Failure`] with the exit code that fits.
 pub fn export(args: &BenchmarkExportArgs) -> Result<(), Failure> {
     let cases = &args.cases;
-    let ids = online_streams(&cases.world, &args.rows, &args.split, cases.cases, cases.seed)?;
-    let written = export_streams(&ids, &args.out).map_err(|e| Failure::Check(e.to_string()))?;
+    let export = OnlineExport {
+        world: &cases.world,
+        rows: &args.rows,
+        split: &args.split,
+        cases: cases.cases,
+        seed: cases.seed,
+        measured: args.measured.as_deref(),
+        parquet: args.parquet,
+    };
+    let written = export.write(&args.out)?;
     print(&format!(
         "{written} streams in {}\nKey, to be kept secret: {}\n",
         args.out.display(),

@@ -5,10 +5,12 @@ mod case_journal;
 mod custom_effects;
 mod diagnosis;
 mod online;
+mod online_export;
 mod planning;
 
 pub use diagnosis::{CaseSelection, DiagnosisBenchmark};
-pub use online::{Player, judge_online, online_files, online_streams, replay_streams};
+pub use online::{Player, judge_online, online_files, replay_streams};
+pub use online_export::OnlineExport;
 pub use planning::PlanningBenchmark;
 
 use crate::error::Error;

@@ -11,40 +11,15 @@ use std::sync::Mutex;
 use std::time::Instant;
 use stylet_core::config::Algorithm;
 use stylet_core::{EnhanceConfig, Enhancer, Sample};
-use stylet_examine::World;
 use stylet_examine::challenge_export::ChallengeError;
 use stylet_examine::online::stream_folder::{
     EntrantFile, ExportedStream, exported_streams, read_answers, stream_samples, streams_with_truth,
 };
-use stylet_examine::online::stream_id::{Row, Split, StreamId, stream_ids};
 use stylet_examine::online::stream_scores::{EntrantScore, score_entrant};
 use stylet_stats::parallel::*;
 
 fn request(error: ChallengeError) -> Error {
     Error::Request(error.to_string())
-}
-
-/// The streams of the rows named by these words; `all` selects every row.
-///
-/// # Errors
-/// [`Error::Request`] for an unknown word, with the known ones.
-pub fn online_streams(
-    world: &str,
-    rows: &[String],
-    split: &str,
-    cases: u64,
-    seed: u64,
-) -> Result<Vec<StreamId>, Error> {
-    let world = super::parse_word("--world", world, World::ALL, World::parse, World::as_str)?;
-    let split = super::parse_word("--split", split, Split::ALL, Split::parse, Split::as_str)?;
-    let rows = if rows.iter().any(|r| r == "all") {
-        Row::ALL.to_vec()
-    } else {
-        rows.iter()
-            .map(|r| super::parse_word("--rows", r, Row::ALL, Row::parse, Row::as_str))
-            .collect::<Result<_, _>>()?
-    };
-    Ok(stream_ids(world, &rows, split, cases, seed))
 }
 
 /// Detector under test.
@@ -354,6 +329,7 @@ pub fn online_files(scores: &[EntrantScore]) -> Result<OutputFiles, Error> {
 #[cfg(test)]
 #[allow(clippy::unwrap_used)]
 mod tests {
+    use super::super::OnlineExport;
     use super::*;
 
     fn scratch(name: &str) -> PathBuf {
@@ -364,9 +340,18 @@ mod tests {
     }
 
     fn exported(folder: &Path) -> PathBuf {
-        let ids = online_streams("plain", &["constant".to_owned()], "make", 3, 4).unwrap();
+        let rows = ["constant".to_owned()];
+        let export = OnlineExport {
+            world: "plain",
+            rows: &rows,
+            split: "make",
+            cases: 3,
+            seed: 4,
+            measured: None,
+            parquet: false,
+        };
         let streams = folder.join("streams");
-        stylet_examine::online::stream_folder::export_streams(&ids, &streams).unwrap();
+        export.write(&streams).unwrap();
         streams
     }
 

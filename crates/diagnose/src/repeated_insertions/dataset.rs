@@ -218,7 +218,11 @@ impl Dataset {
             .collect())
     }
 
-    fn read(&self, file: &Path) -> Result<Vec<(String, Recording, Vec<QualityNote>)>, DatasetError> {
+    /// Reads the recordings in a file: one, or with [`Dataset::split_by`] one per specimen.
+    ///
+    /// # Errors
+    /// [`DatasetError::Recording`].
+    pub fn read(&self, file: &Path) -> Result<Vec<(String, Recording, Vec<QualityNote>)>, DatasetError> {
         let name =
             file.file_name().map_or_else(|| file.display().to_string(), |n| n.to_string_lossy().into_owned());
         if self.split_by.is_empty() {

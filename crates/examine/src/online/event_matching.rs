@@ -39,31 +39,44 @@ impl Window {
             Window::Found => found,
             Window::Within50ms => late_s.abs() <= CLOSE_S,
             Window::WithinHalfMillimetre => {
-                found && (stream.path.position_m(event.time_s) - puncture.position_m).abs() <= CLOSE_M
+                found && (stream.position_at_m(event.time_s) - puncture.position_m).abs() <= CLOSE_M
             }
         }
     }
 }
 
-/// Number of repeated events of the same puncture: while a layer still tears, each of its steps may be reported.
+/// Number of events that are neither hits nor false alarms: repeated events of the same puncture (while a layer still tears, each of its
+/// steps may be reported), and those at possible punctures.
 #[must_use]
-pub fn repeated_events(stream: &Stream, events: &[Event]) -> usize {
+pub fn uncounted_events(stream: &Stream, events: &[Event]) -> usize {
     let hits = match_events(stream, events, Window::Found);
-    let matched = |k: usize| hits.contains(&Some(k));
     let tears = |event: &Event| {
         stream.punctures.iter().zip(&hits).any(|(puncture, hit)| {
             hit.is_some() && (puncture.time_s..=puncture.released_s + EARLY_S).contains(&event.time_s)
         })
     };
-    (0..events.len()).filter(|&k| !matched(k) && tears(&events[k])).count()
+    let unmatched = |k: &usize| !hits.contains(&Some(*k));
+    let (repeated, further): (Vec<usize>, Vec<usize>) =
+        (0..events.len()).filter(unmatched).partition(|&k| tears(&events[k]));
+    let further: Vec<Event> = further.into_iter().map(|k| events[k]).collect();
+    let minor = first_events(stream, &stream.minor, &further, Window::Found);
+    repeated.len() + minor.iter().flatten().count()
 }
 
 /// For each puncture, the index of the first event in its window that is not matched to an earlier puncture.
 #[must_use]
 pub fn match_events(stream: &Stream, events: &[Event], window: Window) -> Vec<Option<usize>> {
+    first_events(stream, &stream.punctures, events, window)
+}
+
+fn first_events(
+    stream: &Stream,
+    punctures: &[TruePuncture],
+    events: &[Event],
+    window: Window,
+) -> Vec<Option<usize>> {
     let mut taken = vec![false; events.len()];
-    stream
-        .punctures
+    punctures
         .iter()
         .map(|puncture| {
             let hit = (0..events.len()).find(|&k| !taken[k] && window.holds(stream, puncture, &events[k]));
@@ -111,5 +124,18 @@ mod tests {
         let twice = [event(0.01), event(0.02)];
         let hits: Vec<usize> = match_events(&stream, &twice, Window::Found).into_iter().flatten().collect();
         assert_eq!(hits, [0]);
+    }
+
+    #[test]
+    fn an_event_at_a_possible_puncture_does_not_count() {
+        let mut stream = simulate_stream(&stream_ids(World::Plain, &[Row::Constant], Split::Make, 1, 3)[0]);
+        stream.minor = std::mem::take(&mut stream.punctures);
+        let minor = stream.minor[0];
+        let event = |late_s: f64| Event { time_s: minor.time_s + late_s, drop_n: None, confidence: None };
+        assert!(match_events(&stream, &[event(0.02)], Window::Found).is_empty());
+        assert_eq!(uncounted_events(&stream, &[event(0.02)]), 1);
+        // One event per possible puncture.
+        assert_eq!(uncounted_events(&stream, &[event(0.02), event(0.03)]), 1);
+        assert_eq!(uncounted_events(&stream, &[event(-0.06)]), 0);
     }
 }

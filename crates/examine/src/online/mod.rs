@@ -8,6 +8,7 @@
 //! | [`hand_held_motion`] | motion of a hand, of a sticking drive, and forces from the side |
 //! | [`moving_tissue`] | tissue that breathes under the needle |
 //! | [`simulate_stream`] | the samples and the truth |
+//! | [`measured_stream`] | recordings as streams |
 //! | [`stream_folder`] | export to a folder, and reading answers |
 //! | [`event_matching`] | which event belongs to which puncture |
 //! | [`stream_scores`] | precision, recall, delay, false alarms, by row and entrant |
@@ -15,6 +16,7 @@
 pub mod draw_stream;
 pub mod event_matching;
 pub mod hand_held_motion;
+pub mod measured_stream;
 pub mod moving_tissue;
 pub mod simulate_stream;
 pub mod stream_folder;

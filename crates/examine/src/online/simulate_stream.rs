@@ -12,6 +12,8 @@ use crate::simulator::rich_world::RichWorld;
 use crate::simulator::sensor_noise::NoiseGenerator;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
+use serde::{Deserialize, Serialize};
+use stylet_stats::interpolate;
 
 /// Longest step of the simulation in s.
 const STEP_S: f64 = 2e-4;
@@ -22,8 +24,8 @@ const LONGEST_GAP: usize = 20;
 /// Resolution of the recorded position in m.
 const ENCODER_M: f64 = 1e-6;
 
-/// A true puncture.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A true puncture, or in a recording a fall of the force.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TruePuncture {
     /// Time in s.
     pub time_s: f64,
@@ -38,29 +40,40 @@ pub struct TruePuncture {
 /// A stream with its truth.
 #[derive(Clone, Debug)]
 pub struct Stream {
-    /// Identifier.
-    pub id: StreamId,
+    /// Row of the table.
+    pub row: &'static str,
     /// Nominal rate in Hz.
     pub rate_hz: f64,
-    /// Motion of the base.
-    pub path: MotionPath,
+    /// Motion of the base; `None` in a recording.
+    pub path: Option<MotionPath>,
     /// Times of the samples in s.
     pub time_s: Vec<f64>,
     /// Recorded positions in m.
     pub position_m: Vec<f64>,
     /// Recorded forces in N.
     pub force_n: Vec<f64>,
-    /// Force on the tip in N at the samples.
+    /// Force on the tip in N at the samples; empty in a recording.
     pub tip_n: Vec<f64>,
     /// The punctures in the order of time.
     pub punctures: Vec<TruePuncture>,
+    /// Possible punctures: an event there is neither a hit nor a false alarm.
+    pub minor: Vec<TruePuncture>,
 }
 
 impl Stream {
     /// Duration in s.
     #[must_use]
     pub fn duration_s(&self) -> f64 {
-        self.time_s.last().copied().unwrap_or(0.0)
+        self.time_s.last().zip(self.time_s.first()).map_or(0.0, |(last, first)| last - first)
+    }
+
+    /// Position of the base in m: of the motion, or interpolated between the recorded samples.
+    #[must_use]
+    pub fn position_at_m(&self, time_s: f64) -> f64 {
+        match &self.path {
+            Some(path) => path.position_m(time_s),
+            None => interpolate(&self.time_s, &self.position_m, time_s),
+        }
     }
 }
 
@@ -121,14 +134,15 @@ pub fn simulate_stream(id: &StreamId) -> Stream {
         })
         .collect();
     Stream {
-        id: *id,
+        row: id.row.as_str(),
         rate_hz: setup.rate_hz,
         position_m: there.position_m.iter().map(|z| libm::round(z / ENCODER_M) * ENCODER_M).collect(),
         time_s: there.time_s,
         force_n,
         tip_n: there.tip_n,
         punctures,
-        path: setup.path,
+        minor: Vec::new(),
+        path: Some(setup.path),
     }
 }
 

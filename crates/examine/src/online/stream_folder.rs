@@ -2,7 +2,8 @@
 //! and reading of answers.
 
 use super::event_matching::Event;
-use super::simulate_stream::{Stream, simulate_stream};
+use super::measured_stream::{MeasuredReference, MeasuredRow, MeasuredStream};
+use super::simulate_stream::{Stream, TruePuncture, simulate_stream};
 use super::stream_id::{Split, StreamId};
 use super::stream_scores::EntrantAnswers;
 use crate::challenge_export::{ChallengeError, key_path};
@@ -12,16 +13,58 @@ use rand::{RngExt, SeedableRng};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
+use stylet_record::RecordError;
 use stylet_stats::parallel::*;
 
 /// Version of the stream generator. Between versions the same identifier may denote different streams.
 const STREAM_VERSION: u32 = 1;
+/// Columns of the samples.
+const COLUMNS: &str = "time_s,position_m,force_n";
 
-/// Identifier of the stream of each number.
+/// Identifier of the stream of each number, and the reference of each recording.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct StreamKey {
     stream_version: u32,
     streams: BTreeMap<String, StreamId>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    measured: Option<MeasuredKey>,
+}
+
+/// References of the recordings by the numbers of their streams.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct MeasuredKey {
+    derivation: String,
+    streams: BTreeMap<String, MeasuredReference>,
+}
+
+/// Encodes samples of time in s, position in m and force in N; the path is for errors.
+pub type EncodeSamples = fn(&[[f64; 3]], &Path) -> Result<Vec<u8>, RecordError>;
+
+/// A file format of the streams in addition to CSV.
+#[derive(Clone, Copy, Debug)]
+pub struct StreamFormat {
+    /// Ending of the file names.
+    pub ending: &'static str,
+    /// Encoder.
+    pub encode: EncodeSamples,
+}
+
+/// Streams to be exported.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct StreamExport<'a> {
+    /// Simulated ones.
+    pub simulated: &'a [StreamId],
+    /// Recordings.
+    pub measured: Option<&'a MeasuredRow>,
+    /// Second format.
+    pub format: Option<StreamFormat>,
+}
+
+/// Origin of a stream.
+#[derive(Clone, Copy)]
+enum Source<'a> {
+    Simulated(StreamId),
+    Measured(&'a MeasuredStream),
 }
 
 /// Numbers in the answers of a detector, apart from its events.
@@ -54,7 +97,7 @@ fn content_error(path: &Path, why: impl Into<String>) -> ChallengeError {
 /// Writes streams in random order into a new folder, and their key next to it.
 ///
 /// # Errors [`ChallengeError`]; partial output is removed.
-pub fn export_streams(ids: &[StreamId], folder: &Path) -> Result<usize, ChallengeError> {
+pub fn export_streams(export: &StreamExport, folder: &Path) -> Result<usize, ChallengeError> {
     if folder.exists() {
         return Err(ChallengeError::There(folder.display().to_string()));
     }
@@ -62,38 +105,35 @@ pub fn export_streams(ids: &[StreamId], folder: &Path) -> Result<usize, Challeng
     part.push(".part");
     let part = std::path::PathBuf::from(part);
     let _ = std::fs::remove_dir_all(&part);
-    let result = write_folder(ids, &part, folder);
+    let result = write_folder(export, &part, folder);
     if result.is_err() {
         let _ = std::fs::remove_dir_all(&part);
     }
-    result.map(|()| ids.len())
+    result
 }
 
-fn write_folder(ids: &[StreamId], part: &Path, folder: &Path) -> Result<(), ChallengeError> {
-    let mut ids = ids.to_vec();
+fn write_folder(export: &StreamExport, part: &Path, folder: &Path) -> Result<usize, ChallengeError> {
+    let ids = export.simulated;
+    let measured = export.measured.map_or(&[][..], |row| &row.streams);
+    let mut sources: Vec<Source> = ids.iter().copied().map(Source::Simulated).collect();
+    sources.extend(measured.iter().map(Source::Measured));
     let mut rng = ChaCha8Rng::seed_from_u64(ids.first().map_or(0, StreamId::stream_seed));
-    for k in (1..ids.len()).rev() {
-        ids.swap(k, rng.random_range(0..=k));
+    for k in (1..sources.len()).rev() {
+        sources.swap(k, rng.random_range(0..=k));
     }
-    let streams = part.join("streams");
-    std::fs::create_dir_all(&streams).map_err(file_error(&streams))?;
-    let numbered: Vec<(String, StreamId)> =
-        ids.into_iter().enumerate().map(|(k, id)| (format!("{:04}", k + 1), id)).collect();
+    let numbered: Vec<(String, Source)> =
+        sources.into_iter().enumerate().map(|(k, source)| (format!("{:04}", k + 1), source)).collect();
+    let folder_of_streams = part.join("streams");
+    std::fs::create_dir_all(&folder_of_streams).map_err(file_error(&folder_of_streams))?;
     let lines: Vec<(String, String)> = numbered
         .par_iter()
-        .map(|(number, id)| {
-            let stream = simulate_stream(id);
-            let path = streams.join(format!("{number}.csv"));
-            let mut text = String::from("time_s,position_m,force_n\n");
-            for ((t, z), f) in stream.time_s.iter().zip(&stream.position_m).zip(&stream.force_n) {
-                let _ = writeln!(text, "{t:.6},{z:.6},{f:.6}");
-            }
-            std::fs::write(&path, text).map_err(file_error(&path))?;
-            let truth = stream.punctures.iter().fold(String::new(), |mut out, p| {
-                let _ = writeln!(out, "{number},{:.6},{:.6},{:.4}", p.time_s, p.position_m, p.drop_n);
-                out
-            });
-            Ok((format!("{number},{:?}\n", stream.rate_hz), truth))
+        .map(|(number, source)| {
+            let stream = match source {
+                Source::Simulated(id) => simulate_stream(id),
+                Source::Measured(stream) => (*stream).clone().into_stream(),
+            };
+            write_stream(part, number, &stream, export.format)?;
+            Ok((format!("{number},{:?}\n", stream.rate_hz), truth_lines(number, &stream.punctures)))
         })
         .collect::<Result<_, ChallengeError>>()?;
     let list: String = lines.iter().map(|l| l.0.as_str()).collect();
@@ -102,27 +142,84 @@ fn write_folder(ids: &[StreamId], part: &Path, folder: &Path) -> Result<(), Chal
         std::fs::write(&path, text).map_err(file_error(&path))
     };
     write("streams.csv", format!("stream,rate_hz\n{list}"))?;
-    write("README.md", readme(numbered.len()))?;
-    if numbered.iter().all(|(_, id)| id.split == Split::Make) {
+    write("README.md", readme(numbered.len(), export))?;
+    if ids.iter().all(|id| id.split == Split::Make) && measured.is_empty() {
         let truth: String = lines.iter().map(|l| l.1.as_str()).collect();
         write("truth.csv", format!("stream,time_s,position_m,drop_n\n{truth}"))?;
     }
-    let key = StreamKey { stream_version: STREAM_VERSION, streams: numbered.into_iter().collect() };
+    let count = numbered.len();
     let key_file = key_path(folder);
-    let text = serde_json::to_vec_pretty(&key).map_err(|e| file_error(&key_file)(e.into()))?;
+    let text = serde_json::to_vec_pretty(&stream_key(numbered, export.measured))
+        .map_err(|e| file_error(&key_file)(e.into()))?;
     std::fs::write(&key_file, text).map_err(file_error(&key_file))?;
-    std::fs::rename(part, folder).map_err(file_error(folder))
+    std::fs::rename(part, folder).map_err(file_error(folder))?;
+    Ok(count)
 }
 
-fn readme(count: usize) -> String {
+/// Writes the samples as CSV, and these same numbers in a second format.
+fn write_stream(
+    folder: &Path,
+    number: &str,
+    stream: &Stream,
+    format: Option<StreamFormat>,
+) -> Result<(), ChallengeError> {
+    let path = folder.join("streams").join(format!("{number}.csv"));
+    let mut text = format!("{COLUMNS}\n");
+    for ((t, z), f) in stream.time_s.iter().zip(&stream.position_m).zip(&stream.force_n) {
+        let _ = writeln!(text, "{t:.6},{z:.6},{f:.6}");
+    }
+    std::fs::write(&path, text).map_err(file_error(&path))?;
+    if let Some(format) = format {
+        let path = path.with_extension(format.ending);
+        let bytes = (format.encode)(&stream_samples(folder, number)?, &path)?;
+        std::fs::write(&path, bytes).map_err(file_error(&path))?;
+    }
+    Ok(())
+}
+
+fn truth_lines(number: &str, punctures: &[TruePuncture]) -> String {
+    punctures.iter().fold(String::new(), |mut out, p| {
+        let _ = writeln!(out, "{number},{:.6},{:.6},{:.4}", p.time_s, p.position_m, p.drop_n);
+        out
+    })
+}
+
+fn stream_key(numbered: Vec<(String, Source)>, row: Option<&MeasuredRow>) -> StreamKey {
+    let (mut streams, mut measured) = (BTreeMap::new(), BTreeMap::new());
+    for (number, source) in numbered {
+        match source {
+            Source::Simulated(id) => {
+                streams.insert(number, id);
+            }
+            Source::Measured(stream) => {
+                measured.insert(number, stream.reference.clone());
+            }
+        }
+    }
+    let measured = row.map(|row| MeasuredKey { derivation: row.derivation.clone(), streams: measured });
+    StreamKey { stream_version: STREAM_VERSION, streams, measured }
+}
+
+fn readme(count: usize, export: &StreamExport) -> String {
+    let format = export.format.map_or_else(String::new, |format| {
+        format!("`streams/NNNN.{}` (`--{0}`) holds the same numbers. ", format.ending)
+    });
+    let measured = export.measured.map_or_else(String::new, |row| {
+        format!(
+            "\n{} streams are recordings of real insertions (`--measured`), without rows of repeated or backward time stamps: pass them on only as
+their owner allows. Their true punctures are unknown. {}\n",
+            row.streams.len(),
+            row.derivation
+        )
+    });
     format!(
         "# When does the needle puncture a layer?
 
 {count} streams, `streams/NNNN.csv`: `time_s,position_m,force_n` of a needle pushed through layered tissue (SI units; position positive
-into the tissue, force at the needle's base, positive when it resists). `streams.csv` has the rate of each. In the tissue the force rises
-with depth; when a layer is punctured its elastic part is released, while friction along the needle stays. The position of the surface
-and the number of layers are unknown.
-
+into the tissue, force at the needle's base, positive when it resists). {format}`streams.csv` has the rate of each. In the tissue the force
+rises with depth; when a layer is punctured its elastic part is released, while friction along the needle stays. The position of the
+surface and the number of layers are unknown.
+{measured}
 Report each puncture as soon as you can, at the sample at which you know it. Only causal detectors count:
 
     stylet benchmark replay FOLDER --out answers/mine -- python3 mine.py
@@ -179,7 +276,7 @@ pub fn exported_streams(folder: &Path) -> Result<Vec<ExportedStream>, ChallengeE
 /// [`ChallengeError`]: the file and the line.
 pub fn stream_samples(folder: &Path, number: &str) -> Result<Vec<[f64; 3]>, ChallengeError> {
     let path = folder.join("streams").join(format!("{number}.csv"));
-    table(&path, "time_s,position_m,force_n")?
+    table(&path, COLUMNS)?
         .into_iter()
         .map(|(line, fields)| {
             let number = |k: usize| fields.get(k).copied().flatten();
@@ -254,10 +351,17 @@ pub fn streams_with_truth(folder: &Path) -> Result<Vec<(String, Stream)>, Challe
         );
         return Err(content_error(&path, why));
     }
-    Ok(key.streams.into_par_iter().map(|(number, id)| (number, simulate_stream(&id))).collect())
+    let mut streams: Vec<(String, Stream)> =
+        key.streams.into_par_iter().map(|(number, id)| (number, simulate_stream(&id))).collect();
+    for (number, reference) in key.measured.map(|key| key.streams).unwrap_or_default() {
+        let samples = stream_samples(folder, &number)?;
+        streams.push((number, MeasuredStream { samples, reference }.into_stream()));
+    }
+    Ok(streams)
 }
 
-/// Reads the answers in a folder: `events.csv`, and if there are any `entrant.json` and `enhanced/NNNN.csv`.
+/// Reads the answers in a folder: `events.csv`, and if there are any `entrant.json` and, of streams with a known tip force,
+/// `enhanced/NNNN.csv`.
 ///
 /// # Errors
 /// [`ChallengeError`]: the file and the line.
@@ -292,7 +396,8 @@ pub fn read_answers(answers: &Path, streams: &[(String, Stream)]) -> Result<Entr
         .par_iter()
         .filter_map(|(number, stream)| {
             let path = answers.join("enhanced").join(format!("{number}.csv"));
-            path.exists().then(|| Ok((number.clone(), enhancement_error(&path, stream)?)))
+            (!stream.tip_n.is_empty() && path.exists())
+                .then(|| Ok((number.clone(), enhancement_error(&path, stream)?)))
         })
         .collect::<Result<_, ChallengeError>>()?;
     Ok(EntrantAnswers { name, events, enhancement, ns_per_sample: described.ns_per_sample })

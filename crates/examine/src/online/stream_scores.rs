@@ -1,6 +1,6 @@
 //! Scores of a detector over the streams of a row, and over all rows.
 
-use super::event_matching::{Event, Window, match_events, repeated_events};
+use super::event_matching::{Event, Window, match_events, uncounted_events};
 use super::simulate_stream::Stream;
 use super::stream_id::Row;
 use core::fmt::Write as _;
@@ -78,7 +78,7 @@ pub struct StreamScore {
     pub hours: f64,
     /// Punctures in them.
     pub punctures: usize,
-    /// Events reported, without further ones while a layer still tears.
+    /// Events reported, without further ones while a layer still tears and those at possible punctures of recordings.
     pub events: usize,
     /// Punctures without an event from 50 ms before to 1 s after them.
     pub missed: usize,
@@ -144,7 +144,7 @@ impl Counts {
         self.streams += 1;
         self.seconds += stream.duration_s();
         self.punctures += stream.punctures.len();
-        self.events += events.len() - repeated_events(stream, events);
+        self.events += events.len() - uncounted_events(stream, events);
         let hits = |window| match_events(stream, events, window);
         self.within_50ms += hits(Window::Within50ms).iter().flatten().count();
         self.within_half_mm += hits(Window::WithinHalfMillimetre).iter().flatten().count();
@@ -197,7 +197,7 @@ pub fn score_entrant(streams: &[(String, Stream)], answers: &EntrantAnswers) -> 
     let mut rows: Vec<(&str, Counts)> = Vec::new();
     let mut all = Counts::default();
     for (number, stream) in streams {
-        let row = stream.id.row.as_str();
+        let row = stream.row;
         let at = rows.iter().position(|r| r.0 == row).unwrap_or_else(|| {
             rows.push((row, Counts::default()));
             rows.len() - 1
@@ -207,7 +207,8 @@ pub fn score_entrant(streams: &[(String, Stream)], answers: &EntrantAnswers) -> 
             counts.enhancement.extend(answers.enhancement.get(number));
         }
     }
-    rows.sort_by_key(|(row, _)| Row::parse(row));
+    // Measured streams, which are no row of the simulator, come last.
+    rows.sort_by_key(|(row, _)| Row::parse(row).map_or(Row::ALL.len(), |row| row as usize));
     let curve: Vec<CurvePoint> = thresholds(answers)
         .into_iter()
         .map(|threshold| {

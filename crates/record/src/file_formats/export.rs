@@ -47,7 +47,15 @@ fn failed(path: &Path, why: impl std::fmt::Display) -> RecordError {
 /// # Errors
 /// [`RecordError::Foreign`] with the error of the Parquet library.
 pub fn to_parquet(recording: &Recording, path: &Path) -> Result<Vec<u8>, RecordError> {
-    parquet_bytes(&columns(recording)).map_err(|e| failed(path, e))
+    columns_to_parquet(&columns(recording), path)
+}
+
+/// Named columns of equal length as a Parquet file; see [`to_parquet`].
+///
+/// # Errors
+/// [`RecordError::Foreign`] with the error of the Parquet library.
+pub fn columns_to_parquet(columns: &[(String, Vec<f64>)], path: &Path) -> Result<Vec<u8>, RecordError> {
+    parquet_bytes(columns).map_err(|e| failed(path, e))
 }
 
 fn parquet_bytes(columns: &[(String, Vec<f64>)]) -> Result<Vec<u8>, parquet::errors::ParquetError> {

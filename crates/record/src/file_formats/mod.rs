@@ -43,7 +43,7 @@ mod spreadsheet;
 mod topics;
 
 #[cfg(feature = "formats")]
-pub use export::{to_mcap, to_parquet};
+pub use export::{columns_to_parquet, to_mcap, to_parquet};
 
 /// A file format other than text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,6 +4,7 @@ use crate::chart_model::{Chart, Series};
 use crate::page_model::{Cell, Page, Section, Status, Table};
 use crate::pages::formatting::significant_or_dash;
 use crate::palette::Colour;
+use stylet_examine::online::measured_stream::{MEASURED_DESCRIPTION, MEASURED_ROW};
 use stylet_examine::online::stream_id::Row;
 use stylet_examine::online::stream_scores::{EntrantScore, Rate, StreamScore, is_first};
 
@@ -110,10 +111,11 @@ fn curve_chart(
 #[must_use]
 pub fn page(scores: &[EntrantScore]) -> Page {
     let all = scores.first().map(|s| s.all.clone()).unwrap_or_default();
-    let rows = Row::ALL
-        .iter()
-        .filter(|r| scores.iter().any(|s| s.rows.iter().any(|x| x.row == r.as_str())))
-        .map(|r| vec![Cell::text(r.as_str()), Cell::text(r.description())])
+    let described = Row::ALL.iter().map(|r| (r.as_str(), r.description()));
+    let rows = described
+        .chain([(MEASURED_ROW, MEASURED_DESCRIPTION)])
+        .filter(|(row, _)| scores.iter().any(|s| s.rows.iter().any(|x| x.row == *row)))
+        .map(|(row, description)| vec![Cell::text(row), Cell::text(description)])
         .collect();
     let delay = curve_chart(scores, "Median delay, ms", |s, i| s.curve[i].delay_s.map(|d| 1e3 * d));
     let recall =
@@ -141,7 +143,7 @@ pub fn page(scores: &[EntrantScore]) -> Page {
                 .table(rate_table("The needle has moved by at most 0.5 mm since the puncture", scores, |s| s.f1_half_mm))
                 .table(rate_table("The event comes within 50 ms", scores, |s| s.f1_50ms))
                 .table(rate_table("The event comes within 1 s", scores, |s| s.f1))
-                .table(Table::new("Rows: with three amounts, in equal numbers", &["row", "what it is"], rows)),
+                .table(Table::new("Rows: simulated ones with three amounts, in equal numbers", &["row", "what it is"], rows)),
         )
 }
 
