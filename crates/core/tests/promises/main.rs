@@ -21,6 +21,7 @@ mod stylet_late_force;
 mod stylet_numerical_validity;
 mod stylet_offsets;
 mod stylet_relaxation;
+mod stylet_stops;
 mod stylet_zero_steps;
 mod support;
 mod time_jumps;
