@@ -157,6 +157,43 @@ fn a_rise_over_several_samples_or_within_the_noise_is_no_step() {
 }
 
 #[test]
+fn a_jump_that_goes_on_growing_is_no_step() {
+    for seed in 0..SEEDS {
+        // Growth per sample over three samples, less and more than a third of the jump and the noise.
+        for (jump_n, growth_n, is_step) in
+            [(0.3, 0.1, false), (0.3, 0.0, true), (3.0, 0.2, true), (3.0, 0.7, false)]
+        {
+            let mut data = with_step(seed, jump_n, 20.0, 1.0);
+            for s in &mut data.samples {
+                s.force_n += growth_n * ((s.time_s - 20.0) * HZ).clamp(0.0, 12.0);
+            }
+            let found = steps(&enhance(&stylet(), &data.samples));
+            let at_once = found.iter().any(|(_, step)| (step.time_s - 20.0).abs() < 1e-9);
+            assert_eq!(at_once, is_step, "seed {seed}, {jump_n} N and {growth_n} N per sample: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn after_twelve_millimetres_a_rupture_is_final() {
+    let mut kept = 0;
+    for seed in 0..SEEDS {
+        // So large that the loading of the next millimetres hardly decides.
+        for size_n in [-0.5, -0.7, -1.0] {
+            let data = with_step(seed, size_n, 20.0, 1.0);
+            let outputs = enhance(&stylet(), &data.samples);
+            let what = format!("seed {seed}, {size_n} N");
+            for (k, step) in steps(&outputs) {
+                let travel_m = data.samples[k].position_m - step.position_m;
+                assert!(step.withdrawn == Some(2) && travel_m < 12.1e-3, "{what}: after {travel_m} m");
+            }
+            kept += usize::from(ruptures(&outputs).iter().map(|d| d.layer).eq([1, 2, 3, 4]));
+        }
+    }
+    assert!(kept >= 12, "{kept} of 15 kept");
+}
+
+#[test]
 fn true_ruptures_are_never_withdrawn() {
     let ripple = |t: f64| 0.0023 * (1.0 + 0.4 * (std::f64::consts::TAU * 0.3 * t).sin());
     for seed in 0..10 {
