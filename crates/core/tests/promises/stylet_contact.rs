@@ -89,7 +89,8 @@ fn doubtful(seed: u64) -> (Vec<Sample>, impl Fn(f64) -> f64) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let (slope, step_n, step_s) =
         (rng.random_range(0.04..0.08), rng.random_range(0.025..0.05), rng.random_range(0.5..1.0));
-    let (drifts, rho) = (seed % 2 == 0, if seed % 2 == 0 { 0.9 } else { 0.0 });
+    let drifts = seed.is_multiple_of(2);
+    let rho = if drifts { 0.9 } else { 0.0 };
     let zero_n = move |t: f64| match t {
         t if drifts => slope * t,
         t if t > step_s => step_n,

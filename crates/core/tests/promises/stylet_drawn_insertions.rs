@@ -11,7 +11,7 @@ use stylet_core::config::{Contact, FrictionLaw};
 use stylet_core::{EnhanceConfig, Enhancer, LayerEstimate, Output, Sample};
 use stylet_tissue::{AnyEffect, CoulombFriction, ForceLaw, Rupture, Tissue};
 
-const INSERTIONS: u64 = 40;
+const INSERTIONS: u64 = 36;
 /// Table rows per insertion, beside those of events.
 const ROWS: usize = 4;
 /// Relative difference of two numbers of six digits that are rounded differently.
@@ -61,7 +61,7 @@ fn drawn(draw: &mut Draw, seed: u64, dry_n_per_m: f64) -> (Insertion, f64) {
     };
     let dry = [AnyEffect::CoulombFriction(CoulombFriction { c_n_per_m: dry_n_per_m })];
     let law = ForceLaw::new(&tissue, if dry_n_per_m > 0.0 { &dry } else { &[] }).expect("an effect");
-    let (hz, noise_n) = ([200.0, 500.0][usize::from(seed % 5 == 0)], draw.between(0.003, 0.03));
+    let (hz, noise_n) = ([200.0, 500.0][usize::from(seed.is_multiple_of(5))], draw.between(0.003, 0.03));
     let data = insertion_into(&law, start_m, turn_s + back_s, hz, noise_n, seed, speed);
     (lasting(data, draw.sometimes(0.02, 0.5)), turn_s)
 }

@@ -27,6 +27,12 @@ fn steps(outputs: &[Output]) -> Vec<(usize, ZeroStep)> {
     outputs.iter().enumerate().filter_map(|(k, o)| o.zero_step.map(|s| (k, s))).collect()
 }
 
+fn only_step(outputs: &[Output], what: &str) -> (usize, ZeroStep) {
+    let found = steps(outputs);
+    assert_eq!(found.len(), 1, "{what}: {found:?}");
+    found[0]
+}
+
 /// Layers within 1 % and 4 %, friction within 2 %, contact within 0.2 mm; after the last event the force is enhanced as without the step.
 fn assert_unmoved(what: &str, data: &Insertion, outputs: &[Output], plain: &[Output]) {
     let (last, usual) = (outputs.last().expect("outputs"), plain.last().expect("outputs"));
@@ -55,7 +61,7 @@ fn a_jump_that_no_rupture_can_make_is_a_step_of_the_zero_at_once() {
             let data = with_step(seed, size_n, at_s, 1.0);
             let outputs = enhance(&stylet(), &data.samples);
             let what = format!("seed {seed}, {size_n} N after {at_s} s");
-            let [(k, step)] = steps(&outputs)[..] else { panic!("{what}: {:?}", steps(&outputs)) };
+            let (k, step) = only_step(&outputs, &what);
             // Three samples show that it lasts.
             let first = data.samples.iter().position(|s| s.time_s >= at_s - 1e-9).expect("a step");
             assert_eq!(k, first + 3, "{what}");
@@ -90,7 +96,7 @@ fn a_drop_that_was_a_step_is_withdrawn_and_the_old_layer_goes_on() {
             let found = ruptures(&outputs);
             assert_eq!(found.iter().map(|d| d.layer).collect::<Vec<_>>(), [1, 2, 2, 3], "{what}");
             assert!((0.0..0.011).contains(&(found[1].time_s - at_s)), "{what}: {found:?}");
-            let [(k, step)] = steps(&outputs)[..] else { panic!("{what}: {:?}", steps(&outputs)) };
+            let (k, step) = only_step(&outputs, &what);
             assert_eq!(
                 (step.withdrawn, step.in_tissue, step.time_s),
                 (Some(2), true, found[1].time_s),
@@ -133,7 +139,7 @@ fn the_next_rupture_shows_that_the_last_was_a_step() {
         let data = with_step(seed, -0.5, 28.0, 1.0);
         let outputs = enhance(&stylet(), &data.samples);
         let what = format!("seed {seed}");
-        let [(k, step)] = steps(&outputs)[..] else { panic!("{what}: {:?}", steps(&outputs)) };
+        let (k, step) = only_step(&outputs, &what);
         assert_eq!(step.withdrawn, Some(2), "{what}");
         assert!((step.size_n + 0.5).abs() < 3.5 * step.sd_n, "{what}: {step:?}");
         withdrawn += usize::from(outputs[k].detection.is_some_and(|d| d.layer == 2));

@@ -55,11 +55,11 @@ fn least_squares(t: &Totals, prior: [f64; 2], (dt, dz): (f64, f64)) -> ([f64; 3]
 }
 
 fn assert_near(found: &BaselineFit, (x, p): ([f64; 3], [[f64; 3]; 3])) {
-    for r in 0..3 {
-        near(found.x[r], x[r]);
-        for c in 0..3 {
-            near(found.p[r][c], p[r][c]);
-        }
+    for (found, x) in found.x.iter().zip(x) {
+        near(*found, x);
+    }
+    for (found, p) in found.p.iter().flatten().zip(p.iter().flatten()) {
+        near(*found, *p);
     }
 }
 

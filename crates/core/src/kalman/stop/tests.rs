@@ -37,7 +37,8 @@ fn uncertain() -> KalmanEnhancer {
 #[test]
 fn a_drop_by_no_more_than_the_friction_may_be_a_stop() {
     // The whole force of 1.43 N where the base law has not proved itself.
-    let cases: [(fn(&mut KalmanEnhancer), f64); 3] = [
+    type Case = (fn(&mut KalmanEnhancer), f64);
+    let cases: [Case; 3] = [
         (|_| (), friction_n(&uncertain())),
         (|s| s.misfit_weight = 0.1, 1.43),
         (|s| s.base_law_failed = true, 1.43),
