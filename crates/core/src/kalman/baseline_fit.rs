@@ -126,3 +126,6 @@ impl AirHistory {
         fit
     }
 }
+
+#[cfg(test)]
+mod tests;

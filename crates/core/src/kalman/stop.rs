@@ -71,3 +71,6 @@ impl KalmanEnhancer {
         self.stop.filter(|stop| stop.duration_s * self.speed_mps > rounding_m)
     }
 }
+
+#[cfg(test)]
+mod tests;

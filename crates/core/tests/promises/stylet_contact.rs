@@ -1,6 +1,9 @@
 //! Promise: a moving zero of the sensor moves neither the contact nor the stiffness, and what was followed is reported with an interval.
 
 use crate::support::{enhance, gels, insertion, last_estimates, stylet};
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 use stylet_core::{BaselineKind, Sample};
 
@@ -78,4 +81,52 @@ fn the_baseline_that_was_followed_is_reported() {
         }
         assert!(right >= SEEDS - 2, "{slopes:?}: {right} of {SEEDS}");
     }
+}
+
+/// Insertions from 20 mm above the tissue with slow noise of 20 mN, which a drift or a small step of the zero makes look like a contact.
+fn doubtful(seed: u64) -> (Vec<Sample>, impl Fn(f64) -> f64) {
+    let data = insertion(&gels(), -0.02, 25.0, 200.0, 0.0, seed, |t| 0.0025 * (1.0 + 0.3 * (2.0 * t).sin()));
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let (slope, step_n, step_s) =
+        (rng.random_range(0.04..0.08), rng.random_range(0.025..0.05), rng.random_range(0.5..1.0));
+    let drifts = seed.is_multiple_of(2);
+    let rho = if drifts { 0.9 } else { 0.0 };
+    let zero_n = move |t: f64| match t {
+        t if drifts => slope * t,
+        t if t > step_s => step_n,
+        _ => 0.0,
+    };
+    let mut samples = data.samples;
+    let mut slow_n = 0.0;
+    for s in &mut samples {
+        let w: f64 = StandardNormal.sample(&mut rng);
+        slow_n = rho * slow_n + 0.02 * (1.0_f64 - rho * rho).sqrt() * w;
+        s.force_n += slow_n + zero_n(s.time_s);
+    }
+    (samples, zero_n)
+}
+
+#[test]
+fn a_contact_that_turns_out_to_be_a_moving_zero_is_cancelled_and_the_true_one_found() {
+    let (mut cancelled, mut near, mut ruptures, mut off_n) = (0, 0, 0, Vec::new());
+    for seed in 0..60 {
+        let (samples, zero_n) = doubtful(seed);
+        let outputs = enhance(&stylet(), &samples);
+        let cancels = |k: &usize| outputs[k - 1].contact_m.is_some() && outputs[*k].contact_m.is_none();
+        let Some(k) = (1..outputs.len()).find(cancels) else { continue };
+        cancelled += 1;
+        assert!(samples[k].position_m < 0.0, "seed {seed}: cancelled in tissue");
+        let out = &outputs[k];
+        assert_eq!((out.contact_sd_m, out.contact_probability, out.ruptures), (0.0, 0.0, 0), "seed {seed}");
+        off_n.push((out.baseline.offset_n - zero_n(samples[k].time_s)).abs());
+        let last = outputs.last().expect("outputs");
+        near += usize::from(last.contact_m.is_some_and(|m| m.abs() < 5e-4));
+        ruptures += usize::from(last.ruptures == 1);
+    }
+    assert!(cancelled >= 8, "{cancelled} cancelled");
+    // What was taken for a load is the zero.
+    let known = off_n.iter().filter(|off| **off < 0.015).count();
+    assert!(known * 10 >= cancelled * 8, "zero known within 15 mN after {known} of {cancelled}: {off_n:?}");
+    assert!(near * 10 >= cancelled * 9, "{near} of {cancelled} true contacts found");
+    assert!(ruptures * 10 >= cancelled * 9, "{ruptures} of {cancelled} with the one rupture");
 }
