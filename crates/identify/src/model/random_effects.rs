@@ -1,5 +1,8 @@
 //! Random effects: parameters of recordings and days, and their standard deviations.
 
+use crate::model::Model;
+use stylet_tissue::Effect;
+
 /// Largest number of varying effect parameters in one model: the length of the fixed arrays below.
 pub const MAX_VARYING_PARAMETERS: usize = 8;
 
