@@ -10,9 +10,6 @@ use stylet_identify::model::{FreeParameters, Model, RecordingParameters};
 use stylet_identify::noise::NoiseSource;
 use stylet_stats::parallel::*;
 
-/// Effort of a fit with other random effects.
-const EFFORT: Effort = Effort { max_iterations: 6, min_gain_nats: 0.3 };
-
 /// Penalty in nats of the free random effects.
 fn penalty_nats(free: FreeParameters, data: &FitData) -> f64 {
     let effect_count = usize::from(free.recording_surface) + usize::from(free.recording_friction);
@@ -20,10 +17,9 @@ fn penalty_nats(free: FreeParameters, data: &FitData) -> f64 {
     bic_penalty(parameters, data.compared_block_count()) + MIN_GAIN_NATS * effect_count as f64
 }
 
-/// The model with other random effects, of mean zero.
+/// The model with other random effects.
 fn with_random_effects(model: &Model, own_surface: bool, own_friction: bool) -> Model {
     let mut m = model.clone();
-    m.centre_random_effects();
     m.free = FreeParameters { recording_surface: own_surface, recording_friction: own_friction, ..m.free };
     for own in &mut m.per_recording {
         *own = RecordingParameters {
@@ -35,14 +31,6 @@ fn with_random_effects(model: &Model, own_surface: bool, own_friction: bool) -> 
     m
 }
 
-/// The fit with random effects of mean zero, if it is better.
-fn centred(best: Fit, data: &FitData) -> Fit {
-    let mut model = best.model.clone();
-    model.centre_random_effects();
-    let found = fit_if_below(&model, data, EFFORT, best.nats());
-    found.filter(|found| found.nats() < best.nats()).unwrap_or(best)
-}
-
 /// Selects the random effects with the smallest penalised objective; the noise is then estimated again from the residual.
 #[must_use]
 pub fn select_random_effects(best: Fit, data: FitData) -> (Fit, FitData) {
@@ -50,7 +38,6 @@ pub fn select_random_effects(best: Fit, data: FitData) -> (Fit, FitData) {
         return (best, data);
     }
     let now = best.model.free;
-    let best = if now.recording_surface || now.recording_friction { centred(best, &data) } else { best };
     let choices: Vec<(bool, bool)> = [(false, false), (true, false), (false, true), (true, true)]
         .into_iter()
         .filter(|c| *c != (now.recording_surface, now.recording_friction))
@@ -60,7 +47,12 @@ pub fn select_random_effects(best: Fit, data: FitData) -> (Fit, FitData) {
         .par_iter()
         .filter_map(|c| {
             let m = with_random_effects(&best.model, c.0, c.1);
-            fit_if_below(&m, &data, EFFORT, penalised_nats(&best) - penalty_nats(m.free, &data))
+            fit_if_below(
+                &m,
+                &data,
+                Effort { max_iterations: 6, min_gain_nats: 0.3 },
+                penalised_nats(&best) - penalty_nats(m.free, &data),
+            )
         })
         .collect();
     let Some(other) = fits.into_iter().min_by(|a, b| penalised_nats(a).total_cmp(&penalised_nats(b))) else {

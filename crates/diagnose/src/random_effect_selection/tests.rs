@@ -2,7 +2,6 @@ use super::*;
 use crate::test_fixtures::{assumed_layers, fit_simulated};
 use std::sync::Arc;
 use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
-use stylet_identify::likelihood::{replay, residuals};
 use stylet_identify::noise::Noise;
 use stylet_record::Recording;
 
@@ -33,40 +32,10 @@ fn penalty_counts_one_parameter_less_than_recordings() {
 }
 
 #[test]
-fn what_all_recordings_have_in_common_is_shared() {
-    let f = fit_simulated(&[], &[], &[[4e-3, 0.0], [5e-3, 0.0]], |_| 0.0);
-    let mut m = f.fit.model.clone();
-    m.free = FreeParameters { recording_surface: true, recording_friction: true, ..m.free };
-    for (own, ln_friction) in m.per_recording.iter_mut().zip([0.7, 0.9]) {
-        *own = RecordingParameters { surface_m: 1e-4, ln_friction, ..*own };
-    }
-    let mut centred = m.clone();
-    centred.centre_random_effects();
-    let own: Vec<f64> = centred.per_recording.iter().map(|own| own.ln_friction).collect();
-    assert!((own[0] + 0.1).abs() < 1e-12 && (own[1] - 0.1).abs() < 1e-12, "{own:?}");
-    for r in 0..2 {
-        let force = |model: &Model| replay(model, &f.data, r).expect("a prediction").force_n;
-        let off = force(&m).iter().zip(&force(&centred)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(off < 1e-9, "{off}");
-    }
-    // A selection that starts there finds that the recordings do not differ.
-    m.per_recording.iter_mut().for_each(|own| own.ln_friction = 0.7);
-    m.tissue.layers.iter_mut().for_each(|layer| layer.friction_ns_per_m2 *= (-0.7_f64).exp());
-    let start = Fit { residuals: residuals(&m, &f.data).expect("a prediction"), model: m };
-    let found = select_random_effects(start, f.data.clone()).0.model;
-    assert!(!found.free.recording_friction, "{:?}", found.per_recording);
-    let layers = found.tissue.layers.iter().zip(&f.fit.model.tissue.layers);
-    for (found, simulated) in layers {
-        assert!((found.friction_ns_per_m2 / simulated.friction_ns_per_m2 - 1.0).abs() < 0.1);
-    }
-}
-
-#[test]
 fn removed_random_effects_are_zero() {
     let assumed = assumed_layers(&[]);
     let mut m = Model::base(assumed, 2);
     m.free.thickness = true;
-    m.per_recording[0] = RecordingParameters { surface_m: -2e-3, ln_friction: -0.3, varying: [0.7; 8] };
     m.per_recording[1] = RecordingParameters { surface_m: 2e-3, ln_friction: 0.3, varying: [0.7; 8] };
     for (surface, friction) in [(false, false), (true, false), (false, true), (true, true)] {
         let out = with_random_effects(&m, surface, friction);

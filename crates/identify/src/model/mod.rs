@@ -3,13 +3,12 @@
 //! | module | contents |
 //! |---|---|
 //! | `assumptions`, `effect_term` | assumed tissue with tolerances; an effect with its parameter values |
-//! | `free_parameters`, `random_effects`, `centre_random_effects` | which parameters are free; parameters of recordings and days and their scatter |
+//! | `free_parameters`, `random_effects` | which parameters are free; parameters of recordings and days and their scatter |
 //! | `parameter`, `parameter_bounds`, `parameter_values` | role of a parameter; bounds and prior; its value |
 //! | `zero_steps`, `sensor_zero` | steps of the sensor zero in each recording |
 //! | `compiled_model` | tissue model and measurement chain of one recording |
 
 mod assumptions;
-mod centre_random_effects;
 mod compiled_model;
 mod effect_term;
 mod free_parameters;
