@@ -10,7 +10,7 @@ use rand::rngs::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::path::PathBuf;
 use stylet_core::config::{Algorithm, EnhanceConfig};
-use stylet_record::{Column, ColumnMap, ReadOptions, Recording, differentiate, read_csv};
+use stylet_record::{Column, ColumnMap, ReadOptions, differentiate, read_csv};
 use stylet_score::{CLEAR_FALL_RATIO, ForceFall, MINOR_FALL_RATIO, Trace, deepest_samples, force_falls};
 
 fn rms(v: impl Iterator<Item = f64>) -> f64 {
