@@ -16,7 +16,7 @@ pub const MINOR_FALL_RATIO: f64 = 0.4;
 /// Distance in m from the greatest depth at which the needle is still there; above the noise of encoders.
 const DEEPEST_WITHIN_M: f64 = 5e-5;
 
-/// A fall of the force within [`FALL_S`]. Fields are indices of samples where not stated otherwise.
+/// A fall of the force within 0.1 s. Fields are indices of samples where not stated otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceFall {
     /// First sample with a sufficient fall ahead.
