@@ -123,7 +123,9 @@ impl DiagnosisBenchmark {
     pub fn new(plan: Plan, custom: Vec<AnyEffect>, folder: &Path, from_journal: bool) -> Result<Self, Error> {
         let lock = OutputLock::new(folder)?;
         let journal = folder.join("cases.jsonl");
-        keep_effects(&custom, folder, journal.exists() && !from_journal)?;
+        if !from_journal {
+            keep_effects(&custom, folder, journal.exists())?;
+        }
         let mut cases = plan.cases();
         if from_journal {
             let completed = stylet_examine::run_cases::read_journal(&journal)
@@ -160,14 +162,14 @@ impl DiagnosisBenchmark {
     }
 }
 
-/// Keeps the custom effects beside the journal, whose answers depend on them.
+/// Keeps the custom effects beside the journal, whose answers depend on them. A file that is there is never replaced.
 fn keep_effects(custom: &[AnyEffect], folder: &Path, has_journal: bool) -> Result<(), Error> {
     let path = folder.join("effects.ron");
     let text = effects_to_ron(custom).map_err(Error::internal)?;
     let kept = std::fs::read_to_string(&path).ok();
-    if has_journal && kept.as_deref().unwrap_or("[]") != text {
+    if (has_journal || kept.is_some()) && kept.as_deref().unwrap_or("[]") != text {
         return Err(Error::Request(format!(
-            "{}: holds cases with other custom effects; name the same files with --effects, or another folder with --out",
+            "{}: holds other custom effects; name the same files with --effects, or another folder with --out",
             folder.display()
         )));
     }
