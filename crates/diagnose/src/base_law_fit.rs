@@ -42,6 +42,8 @@ pub struct PreparedRecordings {
     pub drops: Vec<Vec<ForceDrop>>,
     /// Lower bound of the noise standard deviation, in N.
     pub min_noise_sd_n: f64,
+    /// Rupture times (s) of the layers in each recording, if they are given instead of assigned.
+    pub rupture_times_s: Option<Vec<Vec<f64>>>,
 }
 
 impl PreparedRecordings {
@@ -50,7 +52,7 @@ impl PreparedRecordings {
     pub fn new(assumed: Arc<Assumptions>, blocks: Vec<BlockAverages>, min_noise_sd_n: f64) -> Self {
         let drops = blocks.par_iter().map(detect_force_drops).collect();
         let zero_steps = vec![Vec::new(); blocks.len()];
-        Self { zero_steps, assumed, blocks: Arc::new(blocks), drops, min_noise_sd_n }
+        Self { zero_steps, assumed, blocks: Arc::new(blocks), drops, min_noise_sd_n, rupture_times_s: None }
     }
 
     /// The same recordings with these steps of the sensor zero, which are subtracted before force drops are detected again.
@@ -105,6 +107,12 @@ const MAX_OBJECTIVE_SHARE: f64 = 0.5;
 pub(crate) fn leaves_noise(f: &Fit, data: &FitData) -> bool {
     let calm = data.with_estimated_noise(&f.residuals.residual_n, NoiseSource::Detrended);
     f.rms_n(data) < MISFIT_FACTOR * calm.noise.sd_n() || leaves_slow_noise(f, &calm)
+}
+
+/// Whether the RMS residual of a fit is that of the quiet parts; also for coarse blocks.
+pub(crate) fn is_rms_that_of_quiet_parts(f: &Fit, data: &FitData) -> bool {
+    let calm = data.with_estimated_noise(&f.residuals.residual_n, NoiseSource::Detrended);
+    f.rms_n(data) < MISFIT_FACTOR * calm.noise.sd_n()
 }
 
 /// Effort of coarse fits and of the first rounds of a full one.
@@ -235,7 +243,10 @@ fn fit_with_assigned_drops(
     let mut best: Option<Fit> = None;
     for strictness in [1.0, 0.5] {
         let from = best.as_ref().map_or(&model, |b| &b.model);
-        let rupture_times_s = assign_ruptures(from, &prepared.blocks, &prepared.drops, strictness, rough_n);
+        let rupture_times_s = match &prepared.rupture_times_s {
+            Some(given) => given.clone(),
+            None => assign_ruptures(from, &prepared.blocks, &prepared.drops, strictness, rough_n),
+        };
         let next = Model { rupture_times_s, ..from.clone() };
         if let Some(new) = fit(&next, &data, Effort { max_iterations: 4, min_gain_nats: 0.3 })
             && best.as_ref().is_none_or(|b| new.nats() < b.nats())

@@ -11,10 +11,11 @@ use crate::random_effect_selection::select_random_effects;
 use crate::zero_steps::{
     remove_weak_steps, toggled, unassigned, with_steps_in_residual, zero_step_candidates,
 };
+use std::sync::Arc;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::likelihood::FitData;
-use stylet_identify::model::{EffectTerm, ZeroStep};
+use stylet_identify::model::{Assumptions, EffectTerm, ZeroStep};
 use stylet_identify::noise::NoiseSource;
 use stylet_identify::score_test::ScoreTest;
 use stylet_stats::parallel::*;
@@ -30,6 +31,7 @@ const MAX_ALTERNATIVES: usize = 6;
 const MAX_EXCHANGES: usize = 3;
 
 /// A search for effects in two parts: a first effect, then further ones.
+#[derive(Clone)]
 pub(crate) struct EffectSearch {
     pub search: Search,
     /// The recordings that the search was fitted to, with the steps of its baseline.
@@ -81,6 +83,25 @@ impl EffectSearch {
             self = self.or_better(other);
         }
         (self.search, self.prepared)
+    }
+
+    /// The same search with weak priors around the fitted layers instead of the assumed ones.
+    pub(crate) fn with_weak_priors(mut self) -> Self {
+        let tissue = self.search.best.model.tissue.clone();
+        let assumed = Arc::new(Assumptions { tissue, ..self.prepared.assumed.with_weak_priors() });
+        let relax = |f: &mut Fit, data: &FitData| {
+            f.model.assumed = Arc::clone(&assumed);
+            if let Some(relaxed) = fit(&f.model, data, Effort::FULL) {
+                *f = relaxed;
+            }
+        };
+        relax(&mut self.search.best, &self.search.data);
+        relax(&mut self.search.base, &self.search.data);
+        if let Some((base, data)) = &mut self.base {
+            relax(base, data);
+        }
+        self.prepared.assumed = assumed;
+        self
     }
 
     fn from_baseline(baseline: Baseline, base: Fit) -> Self {

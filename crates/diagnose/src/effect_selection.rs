@@ -1,6 +1,6 @@
 //! Forward selection of effects: each step adds the effect with the largest penalised gain; superfluous effects are removed afterwards.
 
-use crate::base_law_fit::{PreparedRecordings, with_updated_times};
+use crate::base_law_fit::{PreparedRecordings, is_rms_that_of_quiet_parts, with_updated_times};
 use crate::effect_start::EffectStart;
 use crate::effect_start_values::effect_starts;
 use crate::geometry_selection::fix_geometry;
@@ -33,6 +33,17 @@ const STOP_DISTANCE_NATS: f64 = 100.0;
 const MAX_RESTARTS: usize = 4;
 /// Selection steps in which candidates may be refitted from the prior.
 const MAX_PRIOR_STAGES: usize = 2;
+
+/// A short fit on coarse blocks with at most one effect, to compare start values of the layers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OneEffectFit {
+    /// Logarithm of the likelihood (nats) with the noise that the fit leaves, negative, with the penalty for the parameters of the effect.
+    pub criterion_nats: f64,
+    /// RMS residual in N.
+    pub rms_n: f64,
+    /// Whether it leaves only noise.
+    pub leaves_noise: bool,
+}
 
 impl Search {
     /// Runs the selection from a fit of the base law.
@@ -143,6 +154,33 @@ impl Search {
         let any = stage.selected.is_some();
         self.stages.push(stage);
         any
+    }
+
+    /// The best short fit with at most one effect.
+    pub(crate) fn one_effect_fit(mut self, prepared: &PreparedRecordings) -> OneEffectFit {
+        self.update_tones();
+        let coarse = self.coarse();
+        let ranked = self.promising_starts(prepared);
+        let tried: Vec<&EffectStart> =
+            ranked.iter().take(SHORT_FITS).flatten().filter(|s| s.model.is_none()).collect();
+        let fits: Vec<Fit> = tried
+            .par_iter()
+            .filter_map(|s| fit(&self.best.model.with_effect(s.choice.clone()), &coarse, Effort::SHORT))
+            .collect();
+        let base = residuals(&self.best.model, &coarse)
+            .map(|residuals| Fit { model: self.best.model.clone(), residuals });
+        let blocks = coarse.compared_block_count() as f64;
+        let described = |f: Fit| {
+            let rms_n = f.rms_n(&coarse);
+            OneEffectFit {
+                criterion_nats: blocks * libm::log(rms_n) + self.penalty_of(&f.model),
+                rms_n,
+                leaves_noise: is_rms_that_of_quiet_parts(&f, &coarse),
+            }
+        };
+        let all = fits.into_iter().chain(base).map(described);
+        let none = OneEffectFit { criterion_nats: f64::INFINITY, rms_n: f64::INFINITY, leaves_noise: false };
+        all.min_by(|a, b| a.criterion_nats.total_cmp(&b.criterion_nats)).unwrap_or(none)
     }
 
     /// Start values of the effects whose first-order gain is close to what they require.

@@ -46,6 +46,7 @@ mod identifiability;
 mod formula_proposals;
 mod input_checks;
 mod layer_count;
+mod layer_starts;
 mod local_minima;
 mod mains_frequency;
 mod measured_start;

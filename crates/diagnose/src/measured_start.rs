@@ -2,7 +2,9 @@
 
 use crate::base_law_fit::{PreparedRecordings, fit_base_law, leaves_noise, refit_with_random_effects};
 use crate::baseline_search::EffectSearch;
+use crate::effect_selection::OneEffectFit;
 use crate::found_tissue::FoundTissue;
+use crate::layer_starts::layer_starts;
 use crate::random_effect_selection::select_random_effects;
 use crate::selection_state::Search;
 use std::sync::Arc;
@@ -13,61 +15,81 @@ use stylet_record::Recording;
 
 /// Lower bound of a parameter found in the data, as a share of the assumed one, so that none is zero.
 const MIN_SHARE_OF_ASSUMED: f64 = 1e-3;
+/// Share of a tolerance within which a parameter is at its bound.
+const AT_BOUND: f64 = 1e-6;
+/// Largest number of assignments of force drops that are tried with an effect.
+const MAX_STARTS: usize = 8;
 /// Ratio of RMS residuals from which one fit is better, even if it leaves structure.
 const BETTER_FACTOR: f64 = 2.0;
 
 /// Searches for effects from the assumed parameters (A), from parameters found in the data (D), or from both. `None` when the model cannot
 /// be replayed.
 ///
-/// 1. Only A is searched if its base law leaves only noise, if no layers are found in the data, if the base law from D is within
-///    tolerance of A, or if its RMS residual is larger by [`BETTER_FACTOR`].
-/// 2. Both are searched for a single effect. D is first if its base law leaves only noise, if its RMS residual is smaller by
-///    [`BETTER_FACTOR`], or if it is smaller at all and the fit from A is out of tolerance. The first one that leaves only noise and ends
-///    on its side of the tolerance (A within, D out of it) is completed and returned.
-/// 3. Otherwise A is completed; if A is first, leaves only noise and is within tolerance, it is returned.
-/// 4. Otherwise D is completed too. The one that leaves only noise is returned; of two, the one with fewer effects (if equal: A, unless it
+/// D is the best of several starts: the layers that the online algorithm finds, and those of every assignment of force drops to layers
+/// ([`layer_starts`]).
+///
+/// 1. Only A is searched if its base law leaves only noise within tolerance, or if no layers are found in the data.
+/// 2. A is searched for a single effect first, unless the base law from D leaves only noise, has an RMS residual smaller by
+///    [`BETTER_FACTOR`], or a smaller one at all while the fit from A is out of tolerance. If the search from A leaves only noise within
+///    tolerance, it is completed and returned.
+/// 3. D is the start that fits best with one effect ([`best_start`]). If the search from there leaves only noise out of tolerance, it is
+///    completed and returned.
+/// 4. If the search from A ended out of tolerance and leaves only noise under weak priors, it is completed with these and returned.
+/// 5. Otherwise both are completed. The one that leaves only noise is returned; of two, the one with fewer effects (if equal: A, unless it
 ///    is out of tolerance); of none, A, unless the RMS residual of D is smaller by [`BETTER_FACTOR`].
 pub(crate) fn search_from_any_start(
     prepared: PreparedRecordings,
     recordings: &[Recording],
     progress: &mut impl FnMut(&str),
 ) -> Option<(Search, PreparedRecordings)> {
-    let (base, data) = fit_base_law(&prepared)?;
-    let measured = if leaves_noise(&base, &data) { None } else { fit_from_data(&prepared, recordings) };
-    let ratio = |fit: &Fit, data_of_fit: &FitData| base.rms_n(&data) / fit.rms_n(data_of_fit);
-    let measured = measured.filter(|(_, fit, data_of_fit)| ratio(fit, data_of_fit) * BETTER_FACTOR > 1.0);
-    let Some((measured, fit, data_of_fit)) = measured else {
-        return Some(first_effect(&prepared, base, data, progress).complete(progress));
+    let assumed = BaseLaw::fit(prepared)?;
+    let explained = assumed.leaves_noise() && !is_out_of_tolerance(&assumed.prepared.assumed, &assumed.fit);
+    let starts = if explained { Vec::new() } else { starts_in_data(&assumed.prepared, recordings) };
+    // The two starts that were found in different ways.
+    let simplest = starts.iter().take(2).cloned().filter_map(BaseLaw::fit);
+    let Some(simplest) = simplest.min_by(|a, b| a.rms_n().total_cmp(&b.rms_n())) else {
+        return Some(assumed.first_effect(progress).complete(progress));
     };
-    let ratio = ratio(&fit, &data_of_fit);
+    let ratio = assumed.rms_n() / simplest.rms_n();
     let explains = |found: &Search| found.leaves_noise(&found.best);
     let count = |found: &Search| found.best.model.effects.len();
-    let is_out = |fit: &Fit| is_out_of_tolerance(&prepared.assumed, fit);
+    let is_out = |fit: &Fit| is_out_of_tolerance(&assumed.prepared.assumed, fit);
     let data_first =
-        leaves_noise(&fit, &data_of_fit) || ratio > BETTER_FACTOR || (ratio > 1.0 && is_out(&base));
+        simplest.leaves_noise() || ratio > BETTER_FACTOR || (ratio > 1.0 && is_out(&assumed.fit));
     let is_final = |found: &EffectSearch, data_start: bool| {
         explains(&found.search) && is_out(&found.search.best) == data_start
     };
-    let from = |data_start: bool, progress: &mut _| {
-        let (prepared, base, data) =
-            if data_start { (&measured, &fit, &data_of_fit) } else { (&prepared, &base, &data) };
-        first_effect(prepared, base.clone(), data.clone(), progress)
+    let mut from_assumed = None;
+    if !data_first {
+        let found = assumed.first_effect(progress);
+        if is_final(&found, false) {
+            return Some(found.complete(progress));
+        }
+        from_assumed = Some(found);
+    }
+    let measured = best_start(&assumed, simplest, starts);
+    let from_data = measured.as_ref().map(|m| m.first_effect(progress));
+    let from_data = match from_data {
+        Some(found) if is_final(&found, true) => return Some(found.complete(progress)),
+        found => found,
     };
-    let first = from(data_first, progress);
-    if is_final(&first, data_first) {
-        return Some(first.complete(progress));
+    let from_assumed = from_assumed.unwrap_or_else(|| assumed.first_effect(progress));
+    if data_first && is_final(&from_assumed, false) {
+        return Some(from_assumed.complete(progress));
     }
-    let second = from(!data_first, progress);
-    if is_final(&second, !data_first) {
-        return Some(second.complete(progress));
+    if is_out(&from_assumed.search.best) {
+        let relaxed = from_assumed.clone().with_weak_priors();
+        if explains(&relaxed.search) {
+            return Some(relaxed.complete(progress));
+        }
     }
-    let (assumed, measured) = if data_first { (second, first) } else { (first, second) };
-    let assumed = assumed.complete(progress);
+    let assumed = from_assumed.complete(progress);
+    let Some(from_data) = from_data else { return Some(assumed) };
     if !data_first && explains(&assumed.0) && !is_out(&assumed.0.best) {
         return Some(assumed);
     }
     progress("searching from other numbers");
-    let data = measured.complete(progress);
+    let data = from_data.complete(progress);
     let rms_n = |found: &Search| found.best.rms_n(&found.data);
     let is_data_better = match (explains(&assumed.0), explains(&data.0)) {
         (true, true) if is_out(&assumed.0.best) => count(&data.0) <= count(&assumed.0),
@@ -76,6 +98,37 @@ pub(crate) fn search_from_any_start(
         (_, data_explains) => data_explains,
     };
     Some(if is_data_better { data } else { assumed })
+}
+
+/// A fit of the base law with its data.
+#[derive(Clone)]
+struct BaseLaw {
+    prepared: PreparedRecordings,
+    fit: Fit,
+    data: FitData,
+}
+
+impl BaseLaw {
+    fn fit(prepared: PreparedRecordings) -> Option<Self> {
+        let (fit, data) = fit_base_law(&prepared)?;
+        Some(Self { prepared, fit, data })
+    }
+
+    fn leaves_noise(&self) -> bool {
+        leaves_noise(&self.fit, &self.data)
+    }
+
+    fn rms_n(&self) -> f64 {
+        self.fit.rms_n(&self.data)
+    }
+
+    fn first_effect(&self, progress: &mut impl FnMut(&str)) -> EffectSearch {
+        first_effect(&self.prepared, self.fit.clone(), self.data.clone(), progress)
+    }
+
+    fn one_effect_fit(&self) -> OneEffectFit {
+        Search::start(self.fit.clone(), self.data.clone()).one_effect_fit(&self.prepared)
+    }
 }
 
 /// Selects random effects and searches for one effect from a fit of the base law.
@@ -90,16 +143,52 @@ pub(crate) fn first_effect(
     EffectSearch::first_effect(prepared, base, data, progress)
 }
 
-/// The base law fitted from the layers found in the data; `None` if there are none, or if it is within tolerance of the assumed parameters.
-fn fit_from_data(
-    prepared: &PreparedRecordings,
-    recordings: &[Recording],
-) -> Option<(PreparedRecordings, Fit, FitData)> {
-    let found = FoundTissue::new(recordings, None)?;
-    let assumed = Arc::new(assumptions_from(&found, &prepared.assumed));
-    let measured = PreparedRecordings { assumed, ..prepared.clone() };
-    let (fit, data) = fit_base_law(&measured)?;
-    is_out_of_tolerance(&prepared.assumed, &fit).then_some((measured, fit, data))
+/// Starts in the data: first the layers that the online algorithm finds, then those from assignments of force drops, with weak priors.
+fn starts_in_data(prepared: &PreparedRecordings, recordings: &[Recording]) -> Vec<PreparedRecordings> {
+    let found = FoundTissue::new(recordings, None);
+    let surface_m = found.as_ref().map_or(prepared.assumed.tissue.surface_m, |f| f.surface_m);
+    let starts = layer_starts(prepared, surface_m);
+    let found = found.map(|found| {
+        let assumed = Arc::new(assumptions_from(&found, &prepared.assumed));
+        PreparedRecordings { assumed, ..prepared.clone() }
+    });
+    let assigned = starts.into_iter().take(MAX_STARTS).map(|start| {
+        let mut assumed = prepared.assumed.with_weak_priors();
+        assumed.tissue.surface_m = surface_m;
+        assumed.tissue.layers.iter_mut().zip(start.layers).for_each(|(l, s)| {
+            let floor = |x: f64, assumed: f64| x.max(MIN_SHARE_OF_ASSUMED * assumed);
+            l.stiffness_n_per_m = floor(s.stiffness_n_per_m, l.stiffness_n_per_m);
+            l.friction_ns_per_m2 = floor(s.friction_ns_per_m2, l.friction_ns_per_m2);
+            l.thickness_m = s.thickness_m.max(1e-3);
+            l.puncture_n = l.puncture_n.zip(s.puncture_n).map(|(a, s)| floor(s, a));
+        });
+        let rupture_times_s = Some(start.rupture_times_s);
+        PreparedRecordings { assumed: Arc::new(assumed), rupture_times_s, ..prepared.clone() }
+    });
+    found.into_iter().chain(assigned).collect()
+}
+
+/// The start that fits best with one effect; the first one that leaves only noise ends the search. `None` if its base law is within tolerance
+/// of the assumed parameters, or if those leave an RMS residual that is smaller by [`BETTER_FACTOR`].
+fn best_start(assumed: &BaseLaw, simplest: BaseLaw, starts: Vec<PreparedRecordings>) -> Option<BaseLaw> {
+    if simplest.leaves_noise() {
+        return Some(simplest);
+    }
+    let mut best: Option<(OneEffectFit, BaseLaw)> = None;
+    for start in starts {
+        let Some(tried) = BaseLaw::fit(start) else { continue };
+        let fit = tried.one_effect_fit();
+        let leaves_noise = fit.leaves_noise;
+        if best.as_ref().is_none_or(|b| fit.criterion_nats < b.0.criterion_nats) {
+            best = Some((fit, tried));
+        }
+        if leaves_noise {
+            break;
+        }
+    }
+    let (fit, measured) = best?;
+    let is_elsewhere = is_out_of_tolerance(&assumed.prepared.assumed, &measured.fit);
+    (is_elsewhere && fit.rms_n < BETTER_FACTOR * assumed.one_effect_fit().rms_n).then_some(measured)
 }
 
 /// Whether a fitted surface, stiffness, friction or puncture force is outside the tolerance of the assumed one, or a thickness outside the
@@ -109,7 +198,7 @@ fn is_out_of_tolerance(assumed: &Assumptions, fit: &Fit) -> bool {
     let layers = assumed.tissue.layers.iter().zip(&fit.model.tissue.layers).enumerate();
     moved_m > 2.0 * assumed.surface_tolerance_m
         || layers.into_iter().any(|(k, (a, b))| {
-            let off = |a: f64, b: f64, tolerance: f64| (b / a - 1.0).abs() > tolerance;
+            let off = |a: f64, b: f64, tolerance: f64| (b / a - 1.0).abs() > (1.0 - AT_BOUND) * tolerance;
             off(a.stiffness_n_per_m, b.stiffness_n_per_m, assumed.tolerance[k])
                 || off(a.friction_ns_per_m2, b.friction_ns_per_m2, assumed.tolerance[k])
                 || off(a.thickness_m, b.thickness_m, MAX_TOLERANCES_WIDE * assumed.thickness_tolerance[k])

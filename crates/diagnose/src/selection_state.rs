@@ -25,6 +25,7 @@ pub struct SearchStage {
 }
 
 /// State of the selection.
+#[derive(Clone)]
 pub struct Search {
     /// Fit of the base law.
     pub base: Fit,

@@ -5,16 +5,9 @@ use stylet_diagnose::{Diagnosis, NamedRecording, Options, Verdict, diagnose, sce
 use stylet_examine::{Case, CaseId, Hide, NamedFile, Severity, Size, World, Wrong, make_case};
 use stylet_scenario::Scenario;
 
-fn case(severity: Severity, hide: Hide, index: u64) -> (Case, Scenario, Vec<NamedRecording>) {
-    let id = CaseId {
-        world: World::Plain,
-        wrong: Wrong::Guess,
-        severity,
-        hide,
-        size: Size::Strong,
-        seed: 4,
-        index,
-    };
+fn case(seed: u64, severity: Severity, hide: Hide, index: u64) -> (Case, Scenario, Vec<NamedRecording>) {
+    let id =
+        CaseId { world: World::Plain, wrong: Wrong::Guess, severity, hide, size: Size::Strong, seed, index };
     let case = make_case(&id).expect("a case of the simulator");
     let scenario = Scenario::parse("guess", case.question.assumed_ron.as_deref().expect("a scenario"))
         .expect("its scenario");
@@ -50,7 +43,7 @@ fn held(d: &Diagnosis, case: &Case) -> f64 {
 #[test]
 fn numbers_wrong_by_a_factor_up_to_three_are_found_and_said_and_nothing_is_accused() {
     for index in 0..2 {
-        let (case, scenario, recordings) = case(Severity::Medium, Hide::Clean, index);
+        let (case, scenario, recordings) = case(4, Severity::Medium, Hide::Clean, index);
         let d = diagnose(&scenario, &recordings, &Options::default(), |_| {}).expect("a diagnosis").diagnosis;
         assert_eq!(d.verdict, Verdict::Parameters, "case {index}: {:?}", d.causes);
         assert!(d.findings.iter().any(|f| f.message.contains("times too")), "{:?}", d.findings);
@@ -58,9 +51,24 @@ fn numbers_wrong_by_a_factor_up_to_three_are_found_and_said_and_nothing_is_accus
     }
 }
 
+/// Each of these effects shifts the layers that a fit without it finds.
+#[test]
+fn one_effect_is_named_alone_although_the_numbers_are_guessed() {
+    for (severity, index, effect) in [
+        (Severity::Large, 2, "saturation"),
+        (Severity::Large, 3, "cutting_force"),
+        (Severity::Small, 5, "incomplete_release"),
+    ] {
+        let (_, scenario, recordings) = case(20001, severity, Hide::One, index);
+        let d = diagnose(&scenario, &recordings, &Options::default(), |_| {}).expect("a diagnosis").diagnosis;
+        let causes: Vec<&str> = d.causes.iter().map(|c| c.effect.as_str()).collect();
+        assert_eq!((d.verdict, causes), (Verdict::Named, vec![effect]), "{:?}", d.findings);
+    }
+}
+
 #[test]
 fn without_a_scenario_the_layers_are_found() {
-    let (case, _, recordings) = case(Severity::Small, Hide::Clean, 2);
+    let (case, _, recordings) = case(4, Severity::Small, Hide::Clean, 2);
     let found = scenario_from_recordings("phantom", &recordings, None).expect("layers");
     let truth = &case.setup.truth;
     assert_eq!(found.tissue.layers.len(), truth.layers.len());

@@ -122,6 +122,7 @@ fn search_subset(
         blocks: Arc::new(which.iter().map(|r| prepared.blocks[*r].clone()).collect()),
         drops: which.iter().map(|r| prepared.drops[*r].clone()).collect(),
         min_noise_sd_n: prepared.min_noise_sd_n,
+        rupture_times_s: None,
     };
     (part, which)
 }
