@@ -56,7 +56,8 @@ fn off(found: f64, expected: f64) -> f64 {
 #[test]
 fn the_first_start_has_the_true_layers_whatever_was_assumed() {
     for remaining_n in [0.0, 0.4] {
-        let starts = layer_starts(&insertions(&[4e-3, 9e-3], remaining_n), SURFACE_M);
+        let prepared = insertions(&[4e-3, 9e-3], remaining_n);
+        let starts = layer_starts(&prepared, SURFACE_M);
         let first = starts.first().expect("a start");
         for (found, [d, k, b, f]) in first.layers.iter().zip(LAYERS) {
             assert!(off(found.stiffness_n_per_m, k) < 0.1, "{remaining_n}: {found:?}");
@@ -65,7 +66,7 @@ fn the_first_start_has_the_true_layers_whatever_was_assumed() {
             // The needle does not reach the back of the last layer.
             assert!(d == LAYERS[2][0] || off(found.thickness_m, d) < 0.15, "{remaining_n}: {found:?}");
         }
-        assert!(first.rms_n < 0.05, "{}", first.rms_n);
+        assert!(first.rms_n < 0.05 * prepared.largest_force_n(), "{}", first.rms_n);
         assert!(starts.windows(2).all(|s| s[0].rms_n <= s[1].rms_n));
     }
 }
