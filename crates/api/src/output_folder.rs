@@ -6,17 +6,19 @@
 
 mod manifest;
 mod replaceable;
+mod superseded;
 
 use crate::error::Error;
 pub use manifest::MANIFEST;
 use manifest::{Manifest, hex, sum, sum_of_file};
-use replaceable::{Content, check_files, check_same_input, comparable};
+use replaceable::{Content, check_files, check_same_input, comparable, is_same};
 pub use replaceable::{Inputs, check_folder, check_own_file};
 use sha2::{Digest, Sha256};
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
+use superseded::{kept_inputs, superseded_files};
 
 /// Subfolder in which a set is staged.
 const NEW: &str = ".stylet-new";
@@ -161,8 +163,8 @@ impl OutputLock {
         Ok(StagedFileWriter { name, place, file, hash: Sha256::new() })
     }
 
-    /// Writes a set: files in memory and staged files. Files of the same names are replaced if the folder's manifest lists them and they are
-    /// not inputs; other files are kept.
+    /// Writes a set: files in memory and staged files. It replaces the set that the folder's manifest lists; inputs, changed files and files
+    /// that no manifest lists are kept.
     ///
     /// # Errors
     /// [`Error::OtherCommand`], [`Error::NotReplaced`], [`Error::OtherInput`], [`Error::Output`]; the folder is then unchanged.
@@ -182,7 +184,9 @@ impl OutputLock {
         if let Some(input) = &input {
             check_same_input(&self.folder, input)?;
         }
-        let Err(why) = self.write_until(parts, files, input, &mut || false) else { return Ok(()) };
+        let kept = kept_inputs(&self.folder, |path| inputs.files.iter().any(|input| is_same(path, input)));
+        let old = Manifest { sha256: kept, input, ..Manifest::default() };
+        let Err(why) = self.write_until(parts, files, old, &mut || false) else { return Ok(()) };
         let names = files.iter().map(|(name, _)| *name);
         let names = names.chain(parts.iter().map(|part| part.name)).chain([MANIFEST]);
         if self.folder.join(COMPLETE).exists() && restore_old(&self.folder, names).is_err() {
@@ -192,12 +196,13 @@ impl OutputLock {
         Err(failed(&self.folder, why))
     }
 
-    /// `killed` is called before every change of the disk; tests abort there, as a kill would.
+    /// Adds the files to `manifest`, which may list kept ones, and writes both. `killed` is called before every change of the disk; tests
+    /// abort there, as a kill would.
     fn write_until(
         &self,
         parts: &[StagedFile],
         files: &[(&'static str, Vec<u8>)],
-        input: Option<String>,
+        mut manifest: Manifest,
         killed: &mut dyn FnMut() -> bool,
     ) -> io::Result<()> {
         let folder = &self.folder;
@@ -212,8 +217,7 @@ impl OutputLock {
             check_killed(killed)?;
             fs::create_dir(&new)?;
         }
-        let mut manifest =
-            Manifest { stylet: env!("CARGO_PKG_VERSION").to_owned(), input, ..Manifest::default() };
+        manifest.stylet = env!("CARGO_PKG_VERSION").to_owned();
         for (name, content) in files {
             check_killed(killed)?;
             synced(&new.join(name), content)?;
@@ -344,7 +348,8 @@ fn move_in(folder: &Path, killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
     fs::create_dir(&old)
         .or_else(|e| if e.kind() == io::ErrorKind::AlreadyExists { Ok(()) } else { Err(e) })?;
     // The old manifest first: it does not describe the intermediate state.
-    for name in names.iter().rev() {
+    let superseded = superseded_files(folder);
+    for name in names.iter().rev().chain(&superseded) {
         let place = folder.join(name);
         // A file already in the old folder was put there before a kill.
         if place.exists() && !old.join(name).exists() {
@@ -371,17 +376,26 @@ fn names_in(whole: &Path) -> io::Result<Vec<String>> {
 
 /// Undoes [`move_in`] for a set of these names. Until the last rename a kill leaves the new set.
 fn restore_old<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> io::Result<()> {
-    let (whole, old) = (folder.join(COMPLETE), folder.join(OLD));
+    let whole = folder.join(COMPLETE);
+    // Before the manifests are moved.
+    let superseded = superseded_files(folder);
     for name in names {
-        let (place, new, aside) = (folder.join(name), whole.join(name), old.join(name));
+        let (place, new) = (folder.join(name), whole.join(name));
         if !new.exists() && place.exists() {
             fs::rename(&place, &new)?;
         }
-        if aside.exists() {
-            fs::rename(&aside, &place)?;
-        }
+        put_back(folder, name)?;
+    }
+    for name in &superseded {
+        put_back(folder, name)?;
     }
     fs::rename(&whole, folder.join(NEW))
+}
+
+/// Moves a file of the old set back to its place.
+fn put_back(folder: &Path, name: &str) -> io::Result<()> {
+    let aside = folder.join(OLD).join(name);
+    if aside.exists() { fs::rename(&aside, folder.join(name)) } else { Ok(()) }
 }
 
 /// Removes the staging folders.

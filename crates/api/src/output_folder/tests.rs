@@ -45,7 +45,8 @@ fn killed_at_any_disk_operation_the_folder_holds_the_old_or_the_new_set() -> Res
     let (mut olds, mut news, mut at) = (0, 0, 0);
     loop {
         let folder = scratch.0.join(format!("{at}"));
-        OutputLock::new(&folder)?.write_set(&[], &set("old"), &Inputs::default())?;
+        let old = [set("old"), vec![("only-old.svg", b"old".to_vec())]].concat();
+        OutputLock::new(&folder)?.write_set(&[], &old, &Inputs::default())?;
         fs::write(folder.join("notes.txt"), "mine").map_err(|e| failed(&folder, e))?;
         let lock = OutputLock::new(&folder)?;
         let mut left = at;
@@ -58,7 +59,7 @@ fn killed_at_any_disk_operation_the_folder_holds_the_old_or_the_new_set() -> Res
         } else {
             (Vec::new(), set("new"))
         };
-        let done = lock.write_until(&parts, &files, None, &mut || {
+        let done = lock.write_until(&parts, &files, Manifest::default(), &mut || {
             left -= 1;
             left < 0
         });
@@ -66,7 +67,9 @@ fn killed_at_any_disk_operation_the_folder_holds_the_old_or_the_new_set() -> Res
         recover(&folder)?;
         let now = set_in(&folder);
         assert!(matches!(now.as_deref(), Some("old" | "new")), "killed at change {at}: {now:?}");
-        if now.as_deref() == Some("old") {
+        let is_old = now.as_deref() == Some("old");
+        assert_eq!(folder.join("only-old.svg").exists(), is_old, "killed at change {at}");
+        if is_old {
             olds += 1;
         } else {
             news += 1;
@@ -94,16 +97,17 @@ fn a_move_that_fails_anywhere_is_undone() -> Result<(), Error> {
     let mut taken_back = 0;
     for at in 0..40 {
         let folder = scratch.0.join(format!("{at}"));
-        OutputLock::new(&folder)?.write_set(&[], &set("old"), &Inputs::default())?;
+        let old = [set("old"), vec![("only-old.svg", b"old".to_vec())]].concat();
+        OutputLock::new(&folder)?.write_set(&[], &old, &Inputs::default())?;
         let mut left = at;
         let new = [set("new"), vec![("only-new.svg", b"new".to_vec())]].concat();
         let lock = OutputLock::new(&folder)?;
-        let _ = lock.write_until(&[], &new, None, &mut || {
+        let _ = lock.write_until(&[], &new, Manifest::default(), &mut || {
             left -= 1;
             left < 0
         });
-        // Committed, but not yet moved.
-        if !folder.join(COMPLETE).join(MANIFEST).exists() {
+        // Committed.
+        if !folder.join(COMPLETE).exists() {
             continue;
         }
         taken_back += 1;
@@ -113,8 +117,36 @@ fn a_move_that_fails_anywhere_is_undone() -> Result<(), Error> {
             .map_err(|e| failed(&folder, e))?;
         assert_eq!((set_in(&folder).as_deref(), leftovers(&folder)), (Some("old"), vec![]), "at {at}");
         assert!(!folder.join("only-new.svg").exists(), "at {at}: a file of the set that was given up");
+        assert!(folder.join("only-old.svg").exists(), "at {at}: a file of the old set");
     }
     assert!(taken_back > 8, "{taken_back}");
+    Ok(())
+}
+
+/// A file that only the old set has goes with it, unless it was changed or is an input of the command that writes the new set.
+#[test]
+fn a_file_that_the_new_set_lacks_is_removed() -> Result<(), Error> {
+    let scratch = Scratch::new("superseded");
+    let optional = scratch.0.join("optional.ron");
+    let with_optional = [set("old"), vec![("optional.ron", b"old".to_vec())]].concat();
+    let write = |set: &[(&'static str, Vec<u8>)], inputs: &[&Path]| {
+        let files = inputs.iter().map(|path| path.to_path_buf()).collect();
+        OutputLock::new(&scratch.0)?.write_set(&[], set, &Inputs { files, names_folder: None })
+    };
+    write(&with_optional, &[])?;
+    write(&set("new"), &[])?;
+    assert!(!optional.exists());
+    // An input stays and belongs to the folder: the next set may replace it.
+    write(&with_optional, &[])?;
+    write(&set("new"), &[&optional])?;
+    assert!(optional.exists());
+    write(&with_optional, &[])?;
+    // A changed file is the user's.
+    fs::write(&optional, "mine").map_err(|e| failed(&optional, e))?;
+    write(&set("new"), &[])?;
+    assert_eq!(fs::read_to_string(&optional).unwrap_or_default(), "mine");
+    let refused = write(&with_optional, &[]).expect_err("it would be lost").to_string();
+    assert!(refused.contains("optional.ron"), "{refused}");
     Ok(())
 }
 
