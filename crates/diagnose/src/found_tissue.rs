@@ -8,7 +8,7 @@ use stylet_stats::parallel::*;
 use stylet_tissue::{Layer, Tissue};
 
 /// Smallest thickness of a layer in m.
-const MIN_THICKNESS_M: f64 = 5e-4;
+pub(crate) const MIN_THICKNESS_M: f64 = 5e-4;
 
 /// Layers that the online algorithm found in several recordings: medians over those with the same number of layers.
 pub(crate) struct FoundTissue {
@@ -66,6 +66,22 @@ impl FoundTissue {
             }
         };
         Some(Self { surface_m, layers: (0..count).map(layer).collect() })
+    }
+
+    /// The found layers in place of assumed ones. The thickness found for a layer that did not rupture is only a lower bound.
+    pub(crate) fn layers_for(&self, assumed: &[Layer]) -> Vec<Layer> {
+        let layer = |(l, assumed): (&MedianLayer, &Layer)| Layer {
+            stiffness_n_per_m: l.stiffness_n_per_m,
+            friction_ns_per_m2: l.friction_ns_per_m2,
+            thickness_m: if l.rupture_n.is_some() {
+                l.thickness_m
+            } else {
+                assumed.thickness_m.max(l.thickness_m)
+            },
+            puncture_n: l.rupture_n.or(assumed.puncture_n),
+            ..assumed.clone()
+        };
+        self.layers.iter().zip(assumed).map(layer).collect()
     }
 
     /// The tissue for a scenario. The last layer continues below the deepest point.

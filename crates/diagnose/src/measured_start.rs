@@ -3,7 +3,7 @@
 use crate::base_law_fit::{PreparedRecordings, fit_base_law, leaves_noise, refit_with_random_effects};
 use crate::baseline_search::EffectSearch;
 use crate::effect_selection::OneEffectFit;
-use crate::found_tissue::FoundTissue;
+use crate::found_tissue::{FoundTissue, MIN_THICKNESS_M};
 use crate::layer_starts::layer_starts;
 use crate::random_effect_selection::select_random_effects;
 use crate::selection_state::Search;
@@ -12,6 +12,7 @@ use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{Assumptions, MAX_TOLERANCES_WIDE};
 use stylet_record::Recording;
+use stylet_tissue::Layer;
 
 /// Lower bound of a parameter found in the data, as a share of the assumed one, so that none is zero.
 const MIN_SHARE_OF_ASSUMED: f64 = 1e-3;
@@ -28,7 +29,7 @@ const BETTER_FACTOR: f64 = 2.0;
 /// D is the best of several starts: the layers that the online algorithm finds, and those of every assignment of force drops to layers
 /// ([`layer_starts`]).
 ///
-/// 1. Only A is searched if its base law leaves only noise within tolerance, or if no layers are found in the data.
+/// 1. Only A is searched if its base law leaves only noise, with thicknesses too within tolerance, or if no layers are found in the data.
 /// 2. A is searched for a single effect first, unless the base law from D leaves only noise, has an RMS residual smaller by
 ///    [`BETTER_FACTOR`], or a smaller one at all while the fit from A is out of tolerance. If the search from A leaves only noise within
 ///    tolerance, it is completed and returned.
@@ -43,8 +44,15 @@ pub(crate) fn search_from_any_start(
     progress: &mut impl FnMut(&str),
 ) -> Option<(Search, PreparedRecordings)> {
     let assumed = BaseLaw::fit(prepared)?;
-    let explained = assumed.leaves_noise() && !is_out_of_tolerance(&assumed.prepared.assumed, &assumed.fit);
-    let starts = if explained { Vec::new() } else { starts_in_data(&assumed.prepared, recordings) };
+    let is_out = |fit: &Fit| is_out_of_tolerance(&assumed.prepared.assumed, fit);
+    let model = &assumed.fit.model;
+    let is_as_assumed =
+        !is_out(&assumed.fit) && !(0..model.layers()).any(|layer| model.thickness_out_of_tolerance(layer));
+    let starts = if is_as_assumed && assumed.leaves_noise() {
+        Vec::new()
+    } else {
+        starts_in_data(&assumed.prepared, recordings)
+    };
     // The two starts that were found in different ways.
     let simplest = starts.iter().take(2).cloned().filter_map(BaseLaw::fit);
     let Some(simplest) = simplest.min_by(|a, b| a.rms_n().total_cmp(&b.rms_n())) else {
@@ -53,7 +61,6 @@ pub(crate) fn search_from_any_start(
     let ratio = assumed.rms_n() / simplest.rms_n();
     let explains = |found: &Search| found.leaves_noise(&found.best);
     let count = |found: &Search| found.best.model.effects.len();
-    let is_out = |fit: &Fit| is_out_of_tolerance(&assumed.prepared.assumed, fit);
     let data_first =
         simplest.leaves_noise() || ratio > BETTER_FACTOR || (ratio > 1.0 && is_out(&assumed.fit));
     let is_final = |found: &EffectSearch, data_start: bool| {
@@ -70,7 +77,9 @@ pub(crate) fn search_from_any_start(
     let measured = best_start(&assumed, simplest, starts);
     let from_data = measured.as_ref().map(|m| m.first_effect(progress));
     let from_data = match from_data {
-        Some(found) if is_final(&found, true) => return Some(found.complete(progress)),
+        Some(found) if explains(&found.search) && is_out(&found.search.best) => {
+            return Some(found.complete(progress));
+        }
         found => found,
     };
     let from_assumed = from_assumed.unwrap_or_else(|| assumed.first_effect(progress));
@@ -143,29 +152,19 @@ pub(crate) fn first_effect(
     EffectSearch::first_effect(prepared, base, data, progress)
 }
 
-/// Starts in the data: first the layers that the online algorithm finds, then those from assignments of force drops, with weak priors.
+/// Starts in the data: first the layers that the online algorithm finds, then those from assignments of force drops.
 fn starts_in_data(prepared: &PreparedRecordings, recordings: &[Recording]) -> Vec<PreparedRecordings> {
+    let assumed = &prepared.assumed;
     let found = FoundTissue::new(recordings, None);
-    let surface_m = found.as_ref().map_or(prepared.assumed.tissue.surface_m, |f| f.surface_m);
-    let starts = layer_starts(prepared, surface_m);
-    let found = found.map(|found| {
-        let assumed = Arc::new(assumptions_from(&found, &prepared.assumed));
-        PreparedRecordings { assumed, ..prepared.clone() }
-    });
-    let assigned = starts.into_iter().take(MAX_STARTS).map(|start| {
-        let mut assumed = prepared.assumed.with_weak_priors();
-        assumed.tissue.surface_m = surface_m;
-        assumed.tissue.layers.iter_mut().zip(start.layers).for_each(|(l, s)| {
-            let floor = |x: f64, assumed: f64| x.max(MIN_SHARE_OF_ASSUMED * assumed);
-            l.stiffness_n_per_m = floor(s.stiffness_n_per_m, l.stiffness_n_per_m);
-            l.friction_ns_per_m2 = floor(s.friction_ns_per_m2, l.friction_ns_per_m2);
-            l.thickness_m = s.thickness_m.max(1e-3);
-            l.puncture_n = l.puncture_n.zip(s.puncture_n).map(|(a, s)| floor(s, a));
-        });
-        let rupture_times_s = Some(start.rupture_times_s);
-        PreparedRecordings { assumed: Arc::new(assumed), rupture_times_s, ..prepared.clone() }
-    });
-    found.into_iter().chain(assigned).collect()
+    let surface_m = found.as_ref().map_or(assumed.tissue.surface_m, |f| f.surface_m);
+    let start = |layers: Vec<Layer>, rupture_times_s: Option<Vec<Vec<f64>>>| PreparedRecordings {
+        assumed: Arc::new(with_layers(assumed, surface_m, layers)),
+        rupture_times_s,
+        ..prepared.clone()
+    };
+    let found = found.map(|found| start(found.layers_for(&assumed.tissue.layers), None));
+    let assigned = layer_starts(prepared, surface_m).into_iter().take(MAX_STARTS);
+    found.into_iter().chain(assigned.map(|s| start(s.layers, Some(s.rupture_times_s)))).collect()
 }
 
 /// The start that fits best with one effect; the first one that leaves only noise ends the search. `None` if its base law is within tolerance
@@ -206,19 +205,16 @@ fn is_out_of_tolerance(assumed: &Assumptions, fit: &Fit) -> bool {
         })
 }
 
-/// The assumed tissue with the parameters found in the data, under weak priors; layers that the needle did not reach are unchanged.
-fn assumptions_from(found: &FoundTissue, assumed: &Assumptions) -> Assumptions {
+/// The assumed tissue with layers from the data, under weak priors; layers that the needle did not reach are unchanged.
+fn with_layers(assumed: &Assumptions, surface_m: f64, layers: Vec<Layer>) -> Assumptions {
     let mut out = assumed.with_weak_priors();
-    out.tissue.surface_m = found.surface_m;
-    for (k, layer) in out.tissue.layers.iter_mut().enumerate() {
-        let Some(l) = found.layers.get(k) else { continue };
+    out.tissue.surface_m = surface_m;
+    for (layer, found) in out.tissue.layers.iter_mut().zip(layers) {
         let replace = |x: &mut f64, value: f64| *x = value.max(MIN_SHARE_OF_ASSUMED * *x);
-        replace(&mut layer.stiffness_n_per_m, l.stiffness_n_per_m);
-        replace(&mut layer.friction_ns_per_m2, l.friction_ns_per_m2);
-        // The thickness found for a layer that did not rupture is only a lower bound.
-        layer.thickness_m =
-            if l.rupture_n.is_some() { l.thickness_m } else { layer.thickness_m.max(l.thickness_m) };
-        if let Some((assumed_n, found_n)) = layer.puncture_n.as_mut().zip(l.rupture_n) {
+        replace(&mut layer.stiffness_n_per_m, found.stiffness_n_per_m);
+        replace(&mut layer.friction_ns_per_m2, found.friction_ns_per_m2);
+        layer.thickness_m = found.thickness_m.max(MIN_THICKNESS_M);
+        if let Some((assumed_n, found_n)) = layer.puncture_n.as_mut().zip(found.puncture_n) {
             replace(assumed_n, found_n);
         }
     }
