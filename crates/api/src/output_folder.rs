@@ -348,7 +348,7 @@ fn move_in(folder: &Path, killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
     fs::create_dir(&old)
         .or_else(|e| if e.kind() == io::ErrorKind::AlreadyExists { Ok(()) } else { Err(e) })?;
     // The old manifest first: it does not describe the intermediate state.
-    let superseded = superseded_files(folder);
+    let superseded = superseded_files(folder, &whole, &old);
     for name in names.iter().rev().chain(&superseded) {
         let place = folder.join(name);
         // A file already in the old folder was put there before a kill.
@@ -378,7 +378,7 @@ fn names_in(whole: &Path) -> io::Result<Vec<String>> {
 fn restore_old<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> io::Result<()> {
     let whole = folder.join(COMPLETE);
     // Before the manifests are moved.
-    let superseded = superseded_files(folder);
+    let superseded = superseded_files(folder, &whole, &folder.join(OLD));
     for name in names {
         let (place, new) = (folder.join(name), whole.join(name));
         if !new.exists() && place.exists() {

@@ -1,7 +1,6 @@
 //! Files of an old set that the new set does not have.
 
 use super::manifest::{MANIFEST, Manifest, sum_of_file};
-use super::{COMPLETE, OLD};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -12,16 +11,15 @@ pub(super) fn manifest_in(folder: &Path) -> Manifest {
     serde_json::from_slice(&text).unwrap_or_default()
 }
 
-/// Unchanged files of the old set that are neither in the new one nor inputs, while the new set is moved in: they are moved away with the
-/// rest of the old set.
-pub(super) fn superseded_files(folder: &Path) -> Vec<String> {
-    let (whole, old) = (folder.join(COMPLETE), folder.join(OLD));
+/// Unchanged files of the old set that are neither in the new one nor inputs, while the new set is moved from `whole` and the old one to
+/// `old`: they are moved away with the rest of the old set.
+pub(super) fn superseded_files(folder: &Path, whole: &Path, old: &Path) -> Vec<String> {
     let has_manifest = |from: &Path| from.join(MANIFEST).exists();
     // The old manifest is the first file to be moved away, the new one the last to be moved in.
-    let (new, present) = match (has_manifest(&whole), has_manifest(&old)) {
-        (true, false) => (manifest_in(&whole), manifest_in(folder)),
-        (true, true) => (manifest_in(&whole), manifest_in(&old)),
-        (false, true) => (manifest_in(folder), manifest_in(&old)),
+    let (new, present) = match (has_manifest(whole), has_manifest(old)) {
+        (true, false) => (manifest_in(whole), manifest_in(folder)),
+        (true, true) => (manifest_in(whole), manifest_in(old)),
+        (false, true) => (manifest_in(folder), manifest_in(old)),
         (false, false) => return Vec::new(),
     };
     let is_superseded = |(name, sum): &(String, String)| {
