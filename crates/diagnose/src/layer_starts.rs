@@ -1,29 +1,28 @@
 //! Start values of the layers for each way of assigning force drops to them.
 //!
-//! Given fronts and ruptures, the base law is linear in stiffness and friction. Drops that most recordings have in common are assigned to
-//! the layers in every order-preserving way; for each way the fronts are searched on a grid and the rest is fitted by non-negative least
-//! squares.
+//! Given faces and ruptures, the base law is linear in stiffness and friction. The most significant drops are assigned to the layers in
+//! every order-preserving way; for each way the faces are searched on a grid and the rest is fitted by non-negative least squares. A
+//! constant force after each rupture is fitted too, so that a cutting force or an incomplete release does not shift the faces.
 
 use crate::base_law_fit::PreparedRecordings;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::force_drops::ForceDrop;
 use stylet_identify::model::NO_RUPTURE;
+use stylet_identify::rupture_assignment::RETRACED_M;
 use stylet_stats::least_squares::NormalEquations;
 use stylet_stats::parallel::*;
 use stylet_tissue::Layer;
 
 /// Drops of different recordings closer than this (m) are the same.
 const SAME_DROP_M: f64 = 1.5e-3;
-/// Drops behind the deepest position so far by more than this (m) are not ruptures.
-const RETRACED_M: f64 = 1e-3;
-/// Largest number of common drops, the most significant ones.
+/// Largest number of drops that are assigned, the most significant ones.
 const MAX_DROPS: usize = 7;
-/// Largest number of layers.
+/// Largest number of layers; with more there are no starts.
 const MAX_LAYERS: usize = 6;
-/// Grid points of a front between two ruptures.
-const FRONT_STEPS: usize = 8;
-/// Rounds of the search for the fronts; the grid is halved in each.
-const FRONT_ROUNDS: usize = 3;
+/// Grid points of a face between two ruptures.
+const FACE_STEPS: usize = 8;
+/// Rounds of the search for the faces; the grid is halved in each.
+const FACE_ROUNDS: usize = 3;
 /// Seconds that are averaged into one row of the regression.
 const ROW_S: f64 = 0.1;
 
@@ -44,7 +43,7 @@ pub(crate) fn layer_starts(prepared: &PreparedRecordings, surface_m: f64) -> Vec
     let count = assumed.len();
     let tables: Vec<Table> =
         prepared.blocks.iter().zip(&prepared.drops).map(|(b, d)| Table::new(b, d)).collect();
-    let drops = common_drops(&tables, surface_m);
+    let drops = places_of_drops(&tables, surface_m);
     if count > MAX_LAYERS {
         return Vec::new();
     }
@@ -104,7 +103,7 @@ impl Table {
 
 /// Positions (m) of the most significant drops behind the surface, in ascending order; drops of several recordings at the same place count
 /// as one.
-fn common_drops(tables: &[Table], surface_m: f64) -> Vec<f64> {
+fn places_of_drops(tables: &[Table], surface_m: f64) -> Vec<f64> {
     let mut left: Vec<Vec<ForceDrop>> = tables
         .iter()
         .map(|t| t.drops.iter().copied().filter(|d| d.position_m > surface_m).collect())
@@ -137,6 +136,7 @@ fn subsets(n: usize, sizes: &[usize]) -> Vec<Vec<usize>> {
     (0..1_u32 << n).map(with).filter(|s| sizes.contains(&s.len())).collect()
 }
 
+/// The start in which the first layers rupture at these positions (m).
 fn start_for(tables: &[Table], assumed: &[Layer], surface_m: f64, ruptures_m: &[f64]) -> Option<LayerStart> {
     let count = assumed.len();
     let deepest_m = tables.iter().map(|t| t.deepest_m).fold(f64::NEG_INFINITY, f64::max);
@@ -155,16 +155,16 @@ fn start_for(tables: &[Table], assumed: &[Layer], surface_m: f64, ruptures_m: &[
         })
         .collect();
     let mut best = regress(tables, &times_s, &faces_m)?;
-    for round in 0..FRONT_ROUNDS {
+    for round in 0..FACE_ROUNDS {
         for l in 0..count {
             let (from, to) = spans[l];
             let middle = faces_m[l + 1];
-            let step = (to - from) / FRONT_STEPS as f64 / f64::from(1_u32 << round);
+            let step = (to - from) / FACE_STEPS as f64 / f64::from(1_u32 << round);
             let grid = |k: usize| {
                 let k = k as f64;
-                if round == 0 { from + k * step } else { middle + (k - 0.5 * FRONT_STEPS as f64) * step }
+                if round == 0 { from + k * step } else { middle + (k - 0.5 * FACE_STEPS as f64) * step }
             };
-            for at in (0..FRONT_STEPS).map(grid).filter(|at| *at >= from && *at < to) {
+            for at in (0..FACE_STEPS).map(grid).filter(|at| *at >= from && *at < to) {
                 let mut moved = faces_m.clone();
                 moved[l + 1] = at;
                 if let Some(other) = regress(tables, &times_s, &moved).filter(|o| o.1 < best.1) {
@@ -192,7 +192,7 @@ fn start_for(tables: &[Table], assumed: &[Layer], surface_m: f64, ruptures_m: &[
     Some(LayerStart { layers, rupture_times_s: times_s, rms_n })
 }
 
-/// Non-negative stiffness of all layers, then friction, and the RMS residual in N.
+/// Non-negative stiffness of all layers, their friction, the forces (N) that stay after their ruptures; and the RMS residual in N.
 fn regress(tables: &[Table], times_s: &[Vec<f64>], faces_m: &[f64]) -> Option<(Vec<f64>, f64)> {
     let count = faces_m.len() - 1;
     let mut sums = NormalEquations::<{ 3 * MAX_LAYERS }>::new(3 * count);

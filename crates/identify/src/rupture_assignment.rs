@@ -19,7 +19,7 @@ const PASSED_SD: f64 = 2.5;
 /// Distance (m) within which recordings agree on a rupture position.
 const AGREEMENT_M: f64 = 1e-3;
 /// Drops further behind the deepest position so far than this distance (m) are not assigned.
-const RETRACED_M: f64 = 1e-3;
+pub const RETRACED_M: f64 = 1e-3;
 /// Expected rupture of a layer: position of its front and of the rupture, standard deviation, stiffness.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct ExpectedRupture {
