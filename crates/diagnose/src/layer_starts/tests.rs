@@ -29,7 +29,7 @@ fn insertions(speeds: &[f64], remaining_n: f64) -> PreparedRecordings {
         let mut state = ForceLawState::default();
         let (mut t, mut z, mut f) = (Vec::new(), Vec::new(), Vec::new());
         for k in 0..(0.077 / speed / 5e-3) as usize {
-            // The speed changes, as otherwise friction and stiffness are not told apart.
+            // The speed changes, so that friction and stiffness are separable.
             let (at, rate) = (5e-3 * k as f64, 1.0 + 0.3 * (1.3 * 5e-3 * k as f64).sin());
             let place = speed * (at + 0.3 / 1.3 * (1.0 - (1.3 * at).cos()));
             let force_n = law.step(&mut state, at, place, speed * rate, |_| {}).total_n;
