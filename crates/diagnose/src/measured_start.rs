@@ -48,14 +48,14 @@ pub(crate) fn search_from_any_start(
     let model = &assumed.fit.model;
     let is_as_assumed =
         !is_out(&assumed.fit) && !(0..model.layers()).any(|layer| model.thickness_out_of_tolerance(layer));
-    let starts = if is_as_assumed && assumed.leaves_noise() {
+    let mut starts = if is_as_assumed && assumed.leaves_noise() {
         Vec::new()
     } else {
         starts_in_data(&assumed.prepared, recordings)
     };
     // The two starts that were found in different ways.
-    let simplest = starts.iter().take(2).cloned().filter_map(BaseLaw::fit);
-    let Some(simplest) = simplest.min_by(|a, b| a.rms_n().total_cmp(&b.rms_n())) else {
+    let first: Vec<BaseLaw> = starts.drain(..starts.len().min(2)).filter_map(BaseLaw::fit).collect();
+    let Some(simplest) = first.iter().min_by(|a, b| a.rms_n().total_cmp(&b.rms_n())) else {
         return Some(assumed.first_effect(progress).complete(progress));
     };
     let ratio = assumed.rms_n() / simplest.rms_n();
@@ -74,7 +74,11 @@ pub(crate) fn search_from_any_start(
         }
         from_assumed = Some(found);
     }
-    let measured = best_start(&assumed, simplest, starts);
+    let measured = if simplest.leaves_noise() {
+        Some(simplest.clone())
+    } else {
+        best_start(&assumed, first.into_iter().chain(starts.into_iter().filter_map(BaseLaw::fit)))
+    };
     let from_data = measured.as_ref().map(|m| m.first_effect(progress));
     let from_data = match from_data {
         Some(found) if explains(&found.search) && is_out(&found.search.best) => {
@@ -169,13 +173,9 @@ fn starts_in_data(prepared: &PreparedRecordings, recordings: &[Recording]) -> Ve
 
 /// The start that fits best with one effect; the first one that leaves only noise ends the search. `None` if its base law is within tolerance
 /// of the assumed parameters, or if those leave an RMS residual that is smaller by [`BETTER_FACTOR`].
-fn best_start(assumed: &BaseLaw, simplest: BaseLaw, starts: Vec<PreparedRecordings>) -> Option<BaseLaw> {
-    if simplest.leaves_noise() {
-        return Some(simplest);
-    }
+fn best_start(assumed: &BaseLaw, starts: impl Iterator<Item = BaseLaw>) -> Option<BaseLaw> {
     let mut best: Option<(OneEffectFit, BaseLaw)> = None;
-    for start in starts {
-        let Some(tried) = BaseLaw::fit(start) else { continue };
+    for tried in starts {
         let fit = tried.one_effect_fit();
         let leaves_noise = fit.leaves_noise;
         if best.as_ref().is_none_or(|b| fit.criterion_nats < b.0.criterion_nats) {

@@ -22,8 +22,11 @@ pub(super) fn superseded_files(folder: &Path, whole: &Path, old: &Path) -> Vec<S
         (false, true) => (manifest_in(folder), manifest_in(old)),
         (false, false) => return Vec::new(),
     };
+    // A manifest that was not written by Stylet could name files elsewhere.
+    let is_here = |name: &str| Path::new(name).file_name().is_some_and(|file| file == name);
     let is_superseded = |(name, sum): &(String, String)| {
-        !new.sha256.contains_key(name)
+        is_here(name)
+            && !new.sha256.contains_key(name)
             && (old.join(name).exists() || sum_of_file(&folder.join(name)).is_ok_and(|found| found == *sum))
     };
     present.sha256.into_iter().filter(is_superseded).map(|(name, _)| name).collect()

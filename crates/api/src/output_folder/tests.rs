@@ -147,6 +147,17 @@ fn a_file_that_the_new_set_lacks_is_removed() -> Result<(), Error> {
     assert_eq!(fs::read_to_string(&optional).unwrap_or_default(), "mine");
     let refused = write(&with_optional, &[]).expect_err("it would be lost").to_string();
     assert!(refused.contains("optional.ron"), "{refused}");
+    // A manifest that names a file elsewhere does not reach it.
+    let elsewhere = Scratch::new("elsewhere");
+    fs::write(&elsewhere.0, "other").map_err(|e| failed(&elsewhere.0, e))?;
+    let name = format!("../{}", elsewhere.0.file_name().unwrap_or_default().to_string_lossy());
+    let mut manifest = superseded::manifest_in(&scratch.0);
+    manifest.sha256.insert(name, sum(b"other"));
+    let text = serde_json::to_vec(&manifest).unwrap_or_default();
+    fs::write(scratch.0.join(MANIFEST), text).map_err(|e| failed(&scratch.0, e))?;
+    write(&set("newer"), &[])?;
+    assert_eq!(fs::read_to_string(&elsewhere.0).unwrap_or_default(), "other");
+    let _ = fs::remove_file(&elsewhere.0);
     Ok(())
 }
 
