@@ -7,6 +7,7 @@ use crate::found_tissue::{FoundTissue, MIN_THICKNESS_M};
 use crate::layer_starts::layer_starts;
 use crate::random_effect_selection::select_random_effects;
 use crate::selection_state::Search;
+use std::cell::LazyCell;
 use std::sync::Arc;
 use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::FitData;
@@ -31,8 +32,9 @@ const BETTER_FACTOR: f64 = 2.0;
 ///
 /// 1. Only A is searched if its base law leaves only noise, with thicknesses too within tolerance, or if no layers are found in the data.
 /// 2. A is searched for a single effect first, unless the base law from D leaves only noise, has an RMS residual smaller by
-///    [`BETTER_FACTOR`], or a smaller one at all while the fit from A is out of tolerance. If the search from A leaves only noise within
-///    tolerance, it is completed and returned.
+///    [`BETTER_FACTOR`], or a smaller one at all while the fit from A is out of tolerance; also if a short fit of A with one effect has
+///    a residual smaller than that of D by this factor. If the search from A leaves only noise within tolerance, it is completed and
+///    returned.
 /// 3. D is the start that fits best with one effect ([`best_start`]). If the search from there leaves only noise out of tolerance, it is
 ///    completed and returned.
 /// 4. If the search from A ended out of tolerance and leaves only noise under weak priors, it is completed with these and returned.
@@ -61,8 +63,10 @@ pub(crate) fn search_from_any_start(
     let ratio = assumed.rms_n() / simplest.rms_n();
     let explains = |found: &Search| found.leaves_noise(&found.best);
     let count = |found: &Search| found.best.model.effects.len();
+    let with_effect = LazyCell::new(|| assumed.one_effect_fit());
     let data_first =
-        simplest.leaves_noise() || ratio > BETTER_FACTOR || (ratio > 1.0 && is_out(&assumed.fit));
+        (simplest.leaves_noise() || ratio > BETTER_FACTOR || (ratio > 1.0 && is_out(&assumed.fit)))
+            && BETTER_FACTOR * with_effect.rms_n > simplest.rms_n();
     let is_final = |found: &EffectSearch, data_start: bool| {
         explains(&found.search) && is_out(&found.search.best) == data_start
     };
@@ -77,7 +81,11 @@ pub(crate) fn search_from_any_start(
     let measured = if simplest.leaves_noise() {
         Some(simplest.clone())
     } else {
-        best_start(&assumed, first.into_iter().chain(starts.into_iter().filter_map(BaseLaw::fit)))
+        best_start(
+            &assumed,
+            with_effect.rms_n,
+            first.into_iter().chain(starts.into_iter().filter_map(BaseLaw::fit)),
+        )
     };
     let from_data = measured.as_ref().map(|m| m.first_effect(progress));
     let from_data = match from_data {
@@ -172,8 +180,12 @@ fn starts_in_data(prepared: &PreparedRecordings, recordings: &[Recording]) -> Ve
 }
 
 /// The start that fits best with one effect; the first one that leaves only noise ends the search. `None` if its base law is within tolerance
-/// of the assumed parameters, or if those leave an RMS residual that is smaller by [`BETTER_FACTOR`].
-fn best_start(assumed: &BaseLaw, starts: impl Iterator<Item = BaseLaw>) -> Option<BaseLaw> {
+/// of the assumed parameters, or if those leave an RMS residual (`assumed_rms_n`) that is smaller by [`BETTER_FACTOR`].
+fn best_start(
+    assumed: &BaseLaw,
+    assumed_rms_n: f64,
+    starts: impl Iterator<Item = BaseLaw>,
+) -> Option<BaseLaw> {
     let mut best: Option<(OneEffectFit, BaseLaw)> = None;
     for tried in starts {
         let fit = tried.one_effect_fit();
@@ -187,7 +199,7 @@ fn best_start(assumed: &BaseLaw, starts: impl Iterator<Item = BaseLaw>) -> Optio
     }
     let (fit, measured) = best?;
     let is_elsewhere = is_out_of_tolerance(&assumed.prepared.assumed, &measured.fit);
-    (is_elsewhere && fit.rms_n < BETTER_FACTOR * assumed.one_effect_fit().rms_n).then_some(measured)
+    (is_elsewhere && fit.rms_n < BETTER_FACTOR * assumed_rms_n).then_some(measured)
 }
 
 /// Whether a fitted surface, stiffness, friction or puncture force is outside the tolerance of the assumed one, or a thickness outside the
