@@ -31,10 +31,10 @@ const BETTER_FACTOR: f64 = 2.0;
 /// ([`layer_starts`]).
 ///
 /// 1. Only A is searched if its base law leaves only noise, with thicknesses too within tolerance, or if no layers are found in the data.
-/// 2. A is searched for a single effect first, unless the base law from D leaves only noise, has an RMS residual smaller by
-///    [`BETTER_FACTOR`], or a smaller one at all while the fit from A is out of tolerance; also if a short fit of A with one effect has
-///    a residual smaller than that of D by this factor. If the search from A leaves only noise within tolerance, it is completed and
-///    returned.
+/// 2. A is searched for a single effect first if a short fit of A with one effect has an RMS residual smaller than the base law from D by
+///    [`BETTER_FACTOR`]. Without such a fit too, unless the base law from D leaves only noise, has a residual smaller than that from A by
+///    this factor, or a smaller one at all while the fit from A is out of tolerance. If the search from A leaves only noise within
+///    tolerance, it is completed and returned.
 /// 3. D is the start that fits best with one effect ([`best_start`]). If the search from there leaves only noise out of tolerance, it is
 ///    completed and returned.
 /// 4. If the search from A ended out of tolerance and leaves only noise under weak priors, it is completed with these and returned.
@@ -67,13 +67,11 @@ pub(crate) fn search_from_any_start(
     let data_first =
         (simplest.leaves_noise() || ratio > BETTER_FACTOR || (ratio > 1.0 && is_out(&assumed.fit)))
             && BETTER_FACTOR * with_effect.rms_n > simplest.rms_n();
-    let is_final = |found: &EffectSearch, data_start: bool| {
-        explains(&found.search) && is_out(&found.search.best) == data_start
-    };
+    let is_final = |found: &EffectSearch| explains(&found.search) && !is_out(&found.search.best);
     let mut from_assumed = None;
     if !data_first {
         let found = assumed.first_effect(progress);
-        if is_final(&found, false) {
+        if is_final(&found) {
             return Some(found.complete(progress));
         }
         from_assumed = Some(found);
@@ -95,7 +93,7 @@ pub(crate) fn search_from_any_start(
         found => found,
     };
     let from_assumed = from_assumed.unwrap_or_else(|| assumed.first_effect(progress));
-    if data_first && is_final(&from_assumed, false) {
+    if data_first && is_final(&from_assumed) {
         return Some(from_assumed.complete(progress));
     }
     if is_out(&from_assumed.search.best) {
