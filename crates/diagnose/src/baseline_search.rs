@@ -1,8 +1,8 @@
 //! Fits the sensor baseline before other effects: offset, drift, force linear in position, steps of the sensor zero.
 //!
 //! The baseline also acts in air and may exceed the force of the tissue. Without it, the base law assigns force drops to wrong layers and
-//! shifts the surface, and a search from there stays in that local minimum. The effect search therefore also starts from the base law with
-//! the baseline terms whose gain exceeds their BIC penalty; the better of both searches is kept.
+//! shifts the surface, and a search from there stays in that local minimum. If one effect leaves structure, the search therefore also starts
+//! from the base law with the baseline terms whose gain exceeds their BIC penalty; the better of both searches is kept.
 
 use crate::base_law_fit::{PreparedRecordings, fit_with_baseline, leaves_noise};
 use crate::effect_selection::{MAX_EFFECTS, Search, SearchStage};
@@ -21,8 +21,6 @@ use stylet_identify::score_test::ScoreTest;
 use stylet_stats::parallel::*;
 use stylet_tissue::{EffectInfo, Proposal};
 
-/// Factor by which a baseline must reduce the RMS residual, down to the noise, for the search without it to be skipped.
-pub(crate) const DOMINANT_FACTOR: f64 = 10.0;
 /// Rounds in which further steps are detected in the residual.
 const RESIDUAL_ROUNDS: usize = 3;
 /// Number of force drops that are tried, one at a time, as steps of the zero instead of ruptures.
@@ -41,32 +39,29 @@ pub(crate) struct EffectSearch {
 }
 
 impl EffectSearch {
-    /// Searches for one effect: from the base law, and from the base law with a baseline if that leaves only noise.
+    /// Searches for one effect from the base law. If that leaves structure, also from the base law with a baseline, if the baseline leaves
+    /// only noise.
     pub(crate) fn first_effect(
         prepared: &PreparedRecordings,
         base: Fit,
         data: FitData,
         progress: &mut impl FnMut(&str),
     ) -> Self {
-        progress("fitting the sensor's baseline");
-        let baseline = Baseline::fit(prepared, &base, &data, false);
-        let is_dominant = |b: &Baseline| base.rms_n(&data) > DOMINANT_FACTOR * b.fit.rms_n(&b.data);
         let one_more = |mut found: Self, progress: &mut _| {
             let most = found.search.best.model.effects.len() + 1;
             found.search.add_effects(most, &found.prepared, progress);
             found
         };
-        let from_base = |progress: &mut _| {
-            let search = Search::start(base.clone(), data.clone());
-            let (prepared, base) = (prepared.clone(), Some((base.clone(), data.clone())));
-            one_more(Self { search, prepared, base }, progress)
-        };
-        match baseline {
-            None => from_base(progress),
-            Some(b) if is_dominant(&b) => one_more(Self::from_baseline(b, base.clone()), progress),
-            Some(b) => {
-                from_base(progress).or_better(one_more(Self::from_baseline(b, base.clone()), progress))
-            }
+        let search = Search::start(base.clone(), data.clone());
+        let from_base = Self { search, prepared: prepared.clone(), base: Some((base.clone(), data.clone())) };
+        let from_base = one_more(from_base, progress);
+        if from_base.search.leaves_noise(&from_base.search.best) {
+            return from_base;
+        }
+        progress("fitting the sensor's baseline");
+        match Baseline::fit(prepared, &base, &data, false) {
+            None => from_base,
+            Some(baseline) => from_base.or_better(one_more(Self::from_baseline(baseline, base), progress)),
         }
     }
 

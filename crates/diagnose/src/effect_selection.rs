@@ -115,9 +115,6 @@ impl Search {
         if let Some(moved) = full.first().and_then(|f| self.with_boundary_moved(f, &coarse, &times)) {
             full[0] = moved;
         }
-        if let Some(moved) = full.first().and_then(|f| self.with_other_strength(f, &coarse, &times)) {
-            full[0] = moved;
-        }
         if let Some(more) = self.refit_candidates_from_prior(&full, &ranked, &coarse, prepared) {
             full.extend(more);
             self.rank(&mut full);

@@ -235,28 +235,6 @@ fn reweighted_search_finds_the_drift() {
 }
 
 #[test]
-fn breaking_force_is_found_in_another_local_minimum() {
-    let membrane: AnyEffect =
-        HiddenMembrane { depth_m: 2e-3, stiffness_n_per_m: 120.0, puncture_n: 0.36 }.into();
-    let (search, prepared) = search_over(std::slice::from_ref(&membrane), &[], |_| 0.0);
-    let times = prepared.drop_times();
-    let found = with(&search, &membrane);
-    let moved = |share: f64| {
-        let mut leader = found.clone();
-        leader.model.effects[0].values[2] *= share;
-        leader.residuals = residuals(&leader.model, &search.data).expect("a replay");
-        search.with_other_strength(&leader, &search.coarse(), &times)
-    };
-    for share in [0.6, 1.7] {
-        let found_names = moved(share).expect("a better place").model.effects[0].values[2];
-        assert!((found_names - 0.36).abs() < 0.02, "{found_names} from {share} times");
-    }
-    assert!(moved(1.0).is_none());
-    let dry_friction = with(&search, &dry_friction(1.0));
-    assert!(search.with_other_strength(&dry_friction, &search.coarse(), &times).is_none());
-}
-
-#[test]
 fn candidates_are_refitted_from_the_prior_when_the_leader_leaves_more_than_noise() {
     let there = HiddenMembrane { depth_m: 2e-3, stiffness_n_per_m: 120.0, puncture_n: 0.36 };
     let membrane: AnyEffect = there.into();
