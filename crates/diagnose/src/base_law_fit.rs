@@ -3,6 +3,7 @@
 use crate::random_effect_selection::select_random_effects;
 use crate::slow_noise::leaves_slow_noise;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::fit::{Effort, Fit, fit, fit_from_zero_scatter};
 use stylet_identify::force_drops::{ForceDrop, detect_force_drops};
@@ -44,6 +45,8 @@ pub struct PreparedRecordings {
     pub min_noise_sd_n: f64,
     /// Rupture times (s) of the layers in each recording, if they are given instead of assigned.
     pub rupture_times_s: Option<Vec<Vec<f64>>>,
+    /// Number of blocks replayed so far, in all fits to these recordings.
+    pub(crate) replayed: Arc<AtomicU64>,
 }
 
 impl PreparedRecordings {
@@ -52,7 +55,23 @@ impl PreparedRecordings {
     pub fn new(assumed: Arc<Assumptions>, blocks: Vec<BlockAverages>, min_noise_sd_n: f64) -> Self {
         let drops = blocks.par_iter().map(detect_force_drops).collect();
         let zero_steps = vec![Vec::new(); blocks.len()];
-        Self { zero_steps, assumed, blocks: Arc::new(blocks), drops, min_noise_sd_n, rupture_times_s: None }
+        Self {
+            zero_steps,
+            assumed,
+            blocks: Arc::new(blocks),
+            drops,
+            min_noise_sd_n,
+            rupture_times_s: None,
+            replayed: Arc::default(),
+        }
+    }
+
+    /// Whether the search for effects has reached its limit of [`MAX_REPLAYS`]. To be asked between fits that run one after another, so that
+    /// the answer is the same for any number of threads.
+    #[must_use]
+    pub fn is_search_limit_reached(&self) -> bool {
+        let blocks: usize = self.blocks.iter().map(BlockAverages::len).sum();
+        self.replayed.load(Ordering::Relaxed) > MAX_REPLAYS * blocks as u64
     }
 
     /// The same recordings with these steps of the sensor zero, which are subtracted before force drops are detected again.
@@ -101,6 +120,9 @@ pub(crate) const MISFIT_FACTOR: f64 = 1.2;
 pub(crate) const COARSENING_FACTOR: usize = 3;
 /// Largest share of the objective that a coarse refit with random effects may leave for a full refit to follow.
 const MAX_OBJECTIVE_SHARE: f64 = 0.5;
+
+/// Replays of all recordings after which a search for effects ends.
+pub(crate) const MAX_REPLAYS: u64 = 200_000;
 
 /// Whether a fit leaves only noise: its RMS residual is that of the quiet parts, or what exceeds it is slow noise, which recordings do not
 /// have in common.
@@ -160,8 +182,7 @@ pub fn refit_from_prior(
     random_effects: RandomEffects,
     data: &FitData,
 ) -> Option<Fit> {
-    let (found, used) = fit_from_prior(prepared, effects, random_effects)?;
-    data.count_replayed(used.blocks_replayed());
+    let (found, _) = fit_from_prior(prepared, effects, random_effects)?;
     fit(&with_updated_times(found.model, data, &prepared.drop_times()), data, Effort::FULL)
 }
 
@@ -174,8 +195,7 @@ pub fn coarse_refit(
     coarse: &FitData,
 ) -> Option<Fit> {
     let averaged = PreparedRecordings { blocks: Arc::clone(&coarse.recordings), ..prepared.clone() };
-    let (found, used) = fit_with_assigned_drops(&averaged, effects, random_effects)?;
-    coarse.count_replayed(used.blocks_replayed());
+    let (found, _) = fit_with_assigned_drops(&averaged, effects, random_effects)?;
     let mut model = found.model;
     if random_effects != (false, false) {
         // Rupture times would otherwise be shifted to compensate for the missing random effects.
@@ -234,7 +254,8 @@ fn fit_with_assigned_drops(
     let baseline = effects.iter().any(|e| e.info.baseline);
     let largest_n = if baseline { prepared.force_range_n() } else { prepared.largest_force_n() };
     let wide_noise = Noise::white(rough_n.max(FIRST_NOISE_SHARE * largest_n));
-    let data = FitData::new(Arc::clone(&prepared.blocks), wide_noise, prepared.min_noise_sd_n);
+    let data = FitData::new(Arc::clone(&prepared.blocks), wide_noise, prepared.min_noise_sd_n)
+        .counted_in(&prepared.replayed);
     let mut start = Model::base(Arc::clone(&prepared.assumed), prepared.blocks.len());
     start.free.wide_thickness = true;
     start.zero_steps.clone_from(&prepared.zero_steps);

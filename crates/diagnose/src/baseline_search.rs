@@ -71,6 +71,7 @@ impl EffectSearch {
         self.add_further(progress);
         if let Some((base, data)) = self.base.clone()
             && !self.search.leaves_noise(&self.search.best)
+            && !self.prepared.is_search_limit_reached()
             && let Some(baseline) = Baseline::fit(&self.prepared, &base, &data, true)
         {
             let mut other = Self::from_baseline(baseline, base);

@@ -3,6 +3,7 @@
 //! Input: a finished diagnosis with held-out errors, noise, residual tests, parameters at bounds and scatter between recordings. Output:
 //! [`Diagnosis::findings`], and agreement, verdict and confidences that do not contradict them.
 
+use crate::base_law_fit::MAX_REPLAYS;
 use crate::check_json::Light;
 use crate::diagnosis_json::{BaseParameter, Diagnosis, Finding, FindingKind, Gain, Verdict};
 use stylet_record::{QualityKind, Recording};
@@ -40,6 +41,8 @@ pub(crate) struct Context {
     pub air_noise_n: Option<f64>,
     /// Resolution of the recorded force in N; errors of this size are not a misfit.
     pub resolution_n: f64,
+    /// Whether the search for effects ended at its limit.
+    pub is_search_limit_reached: bool,
 }
 
 /// Adds the findings to a diagnosis, and sets agreement, verdict and confidences from them.
@@ -106,6 +109,15 @@ fn findings(d: &Diagnosis, context: &Context) -> Vec<Finding> {
     }
     if let Some(message) = noise_level(d.gain.floor_n, context) {
         add(FindingKind::NoiseLevel, message);
+    }
+    if context.is_search_limit_reached {
+        add(
+            FindingKind::SearchLimit,
+            format!(
+                "the search for effects ended at its limit of {MAX_REPLAYS} replays, a further effect may be missing: diagnose fewer or \
+                 shorter recordings"
+            ),
+        );
     }
     for q in d.data_quality.iter().filter(|q| q.note.kind == QualityKind::OutlierRecording) {
         add(FindingKind::OutlierRecording, format!("{} is not like the other recordings", q.recording));

@@ -256,6 +256,7 @@ pub(crate) fn diagnose_given_layers(
         sensor_noise_n: scenario.sensor.force_torque().map(|s| s.noise_n),
         air_noise_n: air_noise_n(scenario, &search.data),
         resolution_n: raw.step_n.unwrap_or(0.0),
+        is_search_limit_reached: prepared.is_search_limit_reached(),
     };
     claims::compare_with_scenario(&mut diagnosis.base_parameters, scenario);
     claims::apply(&mut diagnosis, &context);

@@ -432,6 +432,8 @@ pub enum FindingKind {
     NoiseLevel,
     /// A recording differs from all others.
     OutlierRecording,
+    /// The search for effects ended at its limit.
+    SearchLimit,
     /// With one recording, none can be held out.
     OneRecording,
     /// All recordings have the same motion.

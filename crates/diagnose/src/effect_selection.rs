@@ -72,7 +72,7 @@ impl Search {
         prepared: &PreparedRecordings,
         progress: &mut impl FnMut(&str),
     ) {
-        while self.best.model.effects.len() < max_effects {
+        while self.best.model.effects.len() < max_effects && !prepared.is_search_limit_reached() {
             let another = if self.best.model.effects.is_empty() { "an" } else { "another" };
             progress(&format!("searching for {another} effect"));
             if !self.add_effect(prepared) {
@@ -97,7 +97,10 @@ impl Search {
     pub fn continue_reweighted(&self, prepared: &PreparedRecordings) -> Option<Self> {
         let (best, data) = fit_reweighted(&self.best, &self.data)?;
         let mut search = self.with_best(best, data);
-        while search.best.model.effects.len() < MAX_EFFECTS && search.add_effect(prepared) {
+        while search.best.model.effects.len() < MAX_EFFECTS
+            && !prepared.is_search_limit_reached()
+            && search.add_effect(prepared)
+        {
             (search.best, search.data) = fit_reweighted(&search.best, &search.data)?;
         }
         search.prune();

@@ -39,6 +39,12 @@ impl FitData {
         }
     }
 
+    /// The same data, whose replayed blocks are counted in `replayed`.
+    #[must_use]
+    pub fn counted_in(self, replayed: &Arc<AtomicU64>) -> Self {
+        Self { replayed: Arc::clone(replayed), ..self }
+    }
+
     /// Normalised innovations of residuals `e` (N) of recording `r`; zero in blocks that are not compared.
     #[must_use]
     pub fn whiten(&self, r: usize, e: &[f64]) -> Vec<f64> {

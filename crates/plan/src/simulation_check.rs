@@ -19,7 +19,7 @@ const COMPARED_CANDIDATES: usize = 4;
 const TESTED_CANDIDATES: usize = 6;
 const TEST_ROUNDS: u64 = 2;
 /// Total number of replayed blocks
-/// ([`FitData::blocks_replayed`](stylet_identify::likelihood::FitData::blocks_replayed)), about 40 s on two
+/// ([`FitData::blocks_replayed`](stylet_identify::likelihood::FitData::blocks_replayed)), about a minute on two
 /// cores. If diagnoses cost more, fewer motions and insertions are simulated.
 const MAX_REPLAYED_BLOCKS: u64 = 1_200_000_000;
 /// Weight of the probability from expected gaps, in simulated insertions.

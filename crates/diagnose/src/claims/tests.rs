@@ -39,8 +39,13 @@ fn contradictions() -> Vec<Contradiction> {
     ]
 }
 
-const SENSOR: Context =
-    Context { one_motion: false, sensor_noise_n: Some(0.02), air_noise_n: None, resolution_n: 0.0 };
+const SENSOR: Context = Context {
+    one_motion: false,
+    sensor_noise_n: Some(0.02),
+    air_noise_n: None,
+    resolution_n: 0.0,
+    is_search_limit_reached: false,
+};
 
 #[test]
 fn predictions_to_the_noise_agree() {
@@ -54,6 +59,17 @@ fn predictions_to_the_noise_agree() {
     d.random_effect_sd.rupture_depth_m = 4.9e-3;
     apply(&mut d, &SENSOR);
     assert!(d.agrees && d.findings.is_empty());
+}
+
+#[test]
+fn a_search_that_was_cut_short_neither_agrees_nor_is_sure() {
+    let cut_short = Context { is_search_limit_reached: true, ..SENSOR };
+    let mut d = agreeing();
+    apply(&mut d, &cut_short);
+    assert!(!d.agrees && kinds(&d) == [FindingKind::SearchLimit]);
+    let mut d = named(0.99);
+    apply(&mut d, &cut_short);
+    assert_eq!(d.causes[0].confidence, MAX_CONFIDENCE_CONTRADICTED);
 }
 
 #[test]

@@ -1,4 +1,5 @@
 use super::*;
+use crate::base_law_fit::MAX_REPLAYS;
 use crate::model_pruning::{effect_at_bound, required_gain_nats, strengths_are_determined};
 use crate::repeated_insertions::SegmentedRecording;
 use crate::repeated_insertions::multistart_fit::SetFit;
@@ -8,6 +9,7 @@ use crate::test_fixtures::{
 };
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
+use std::sync::atomic::Ordering;
 use stylet_identify::model::{EffectTerm, ParameterRole};
 use stylet_tissue::{
     AnyEffect, AsymmetricFriction, CoulombFriction, Effect, ForceBias, ForceDrift, HiddenMembrane,
@@ -218,6 +220,20 @@ fn tones_are_detected_and_excluded_from_the_noise() {
     let (noise, nats) = (search.data.noise.clone(), search.best.nats());
     search.update_tones();
     assert!(search.tones_hz.is_empty() && search.data.noise == noise && search.best.nats() == nats);
+}
+
+#[test]
+fn search_ends_at_the_limit_of_replays() {
+    let with_drift = |limit_reached: bool| {
+        let (search, prepared) = search_over(&[], &[], |t| 0.1 * t);
+        let blocks: usize = prepared.blocks.iter().map(|b| b.len()).sum();
+        let before = if limit_reached { MAX_REPLAYS * blocks as u64 + 1 } else { 0 };
+        prepared.replayed.store(before, Ordering::Relaxed);
+        let mut search = Search::start(search.best, search.data);
+        search.add_effects(1, &prepared, &mut |_| {});
+        search.best.model.effects.len()
+    };
+    assert_eq!([false, true].map(with_drift), [1, 0]);
 }
 
 /// A drift together with a local force that no effect explains.

@@ -118,11 +118,10 @@ fn search_subset(
     which.sort_unstable();
     let part = PreparedRecordings {
         zero_steps: which.iter().map(|r| prepared.zero_steps[*r].clone()).collect(),
-        assumed: Arc::clone(&prepared.assumed),
         blocks: Arc::new(which.iter().map(|r| prepared.blocks[*r].clone()).collect()),
         drops: which.iter().map(|r| prepared.drops[*r].clone()).collect(),
-        min_noise_sd_n: prepared.min_noise_sd_n,
         rupture_times_s: None,
+        ..prepared.clone()
     };
     (part, which)
 }
