@@ -66,7 +66,7 @@ impl PreparedRecordings {
         }
     }
 
-    /// Whether the search for effects has reached its limit of [`MAX_REPLAYS`]. To be asked between fits that run one after another, so that
+    /// Whether the search for effects has reached its limit. To be asked between fits that run one after another, so that
     /// the answer is the same for any number of threads.
     #[must_use]
     pub fn is_search_limit_reached(&self) -> bool {
