@@ -74,7 +74,7 @@ impl FitData {
     }
 
     /// Adds to the count of replayed blocks.
-    pub fn count_replayed(&self, blocks: u64) {
+    pub(crate) fn count_replayed(&self, blocks: u64) {
         self.replayed.fetch_add(blocks, Ordering::Relaxed);
     }
 
