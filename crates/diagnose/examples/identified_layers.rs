@@ -5,8 +5,8 @@
 //! ```
 //!
 //! Draws phantoms of the independent simulator until there are `CASES` (default 60) with each of one to four layers. Per number of layers it
-//! prints how often that number is found, and, of the cases in which it is, the largest error of surface and faces in mm and the error of
-//! every stiffness whose label is `determined`. Ends with the median time of an identification, one at a time.
+//! prints how often that number is found and no cause is named, how often the surface and all faces between layers are then within 0.3 mm, and
+//! how many of the stiffnesses with the label `determined` are within 5 %. Ends with the median time of an identification.
 
 use std::error::Error;
 use std::time::Instant;

@@ -47,6 +47,8 @@ pub struct PreparedRecordings {
     pub rupture_times_s: Option<Vec<Vec<f64>>>,
     /// Number of blocks replayed so far, in all fits to these recordings.
     pub(crate) replayed: Arc<AtomicU64>,
+    /// Replays of all recordings after which the search for effects ends.
+    pub(crate) max_replays: u64,
 }
 
 impl PreparedRecordings {
@@ -63,6 +65,7 @@ impl PreparedRecordings {
             min_noise_sd_n,
             rupture_times_s: None,
             replayed: Arc::default(),
+            max_replays: MAX_REPLAYS,
         }
     }
 
@@ -71,7 +74,7 @@ impl PreparedRecordings {
     #[must_use]
     pub fn is_search_limit_reached(&self) -> bool {
         let blocks: usize = self.blocks.iter().map(BlockAverages::len).sum();
-        self.replayed.load(Ordering::Relaxed) > MAX_REPLAYS * blocks as u64
+        self.replayed.load(Ordering::Relaxed) > self.max_replays.saturating_mul(blocks as u64)
     }
 
     /// The same recordings with these steps of the sensor zero, which are subtracted before force drops are detected again.

@@ -121,6 +121,8 @@ fn search_subset(
         blocks: Arc::new(which.iter().map(|r| prepared.blocks[*r].clone()).collect()),
         drops: which.iter().map(|r| prepared.drops[*r].clone()).collect(),
         rupture_times_s: None,
+        // The report of a set does not say that a search was cut short, so none is.
+        max_replays: u64::MAX,
         ..prepared.clone()
     };
     (part, which)
