@@ -2,7 +2,7 @@
 //! `STYLET_MUTATIONS_EACH=1000000 cargo test --release -p stylet-record --all-features --test mutated_files` sets the number per
 //! parser.
 
-#[allow(clippy::panic)] // with the mutation
+#[allow(clippy::panic, dead_code)] // with the mutation; all parsers are fast
 #[path = "../../../tests/mutated/mutate.rs"]
 mod mutate;
 
@@ -107,14 +107,14 @@ fn mutated_matlab_files_are_read_or_refused() {
 #[test]
 fn mutated_sheets_and_bags_are_read_or_refused() {
     let sheets = [foreign("machine.xlsx"), foreign("machine.ods"), foreign("machine.xls")];
-    fuzz_any("sheets", (600, Target::Slow), &sheets, |bytes| {
+    fuzz_any("sheets", (2_000, Target::Text), &sheets, |bytes| {
         read_csv_bytes(bytes, Path::new("a.xlsx"), &ReadOptions::default())
             .is_ok_and(|(recording, _)| recording.check().is_ok())
     });
     let map =
         "Columns(position: (name: \"/tip.pose.position.z\"), force: (name: \"/ft/wrench.wrench.force.z\"))";
     let options = ReadOptions { columns: Some(ron::from_str(map).expect("a map")), repair: false };
-    fuzz_any("bag", (600, Target::Slow), &[foreign("bag.db3")], |bytes| {
+    fuzz_any("bag", (600, Target::Text), &[foreign("bag.db3")], |bytes| {
         read_csv_bytes(bytes, Path::new("a.db3"), &options)
             .is_ok_and(|(recording, _)| recording.check().is_ok())
     });

@@ -20,8 +20,6 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
 #[cfg(feature = "formats")]
-mod compound_file;
-#[cfg(feature = "formats")]
 mod export;
 #[cfg(feature = "formats")]
 mod hdf5;
@@ -41,6 +39,8 @@ mod ros_messages;
 mod spreadsheet;
 #[cfg(feature = "formats")]
 mod topics;
+#[cfg(feature = "formats")]
+mod xls;
 
 #[cfg(feature = "formats")]
 pub use export::{columns_to_parquet, to_mcap, to_parquet};

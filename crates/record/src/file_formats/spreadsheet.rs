@@ -1,7 +1,8 @@
 //! Spreadsheets: xlsx, xls, ods, as the text table that their program would export.
 
 use crate::memory_limit;
-use calamine::{Data, Range, Reader, Sheets, Xlsx, open_workbook_auto_from_rs};
+use calamine::{Data, Range, Reader, Sheets, Xls, Xlsx, open_workbook_auto_from_rs};
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::Cursor;
 
@@ -13,11 +14,13 @@ const CELL_BYTES: u64 = 48;
 
 /// A sheet as text, one line per row, columns separated by tabs. Without a name the sheet with most numbers is taken.
 pub(super) fn to_text(bytes: &[u8], sheet: Option<&str>) -> Result<Vec<u8>, String> {
-    if !bytes.starts_with(b"PK") && !super::compound_file::is_sound(bytes) {
-        return Err("it is damaged: a chain of its sectors does not end".to_owned());
-    }
-    let mut book = open_workbook_auto_from_rs(Cursor::new(bytes))
-        .map_err(|e| format!("it cannot be read ({e}); save it as xlsx, ods or CSV"))?;
+    let unreadable = |e: calamine::Error| format!("it cannot be read ({e}); save it as xlsx, ods or CSV");
+    let mut book = if bytes.starts_with(b"PK") {
+        open_workbook_auto_from_rs(Cursor::new(Cow::Borrowed(bytes))).map_err(unreadable)?
+    } else {
+        let checked = Cursor::new(Cow::Owned(super::xls::checked(bytes)?));
+        Sheets::Xls(Xls::new(checked).map_err(|e| unreadable(e.into()))?)
+    };
     let names = book.sheet_names();
     let list = || names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
     if let Sheets::Xlsx(book) = &mut book {
@@ -74,7 +77,7 @@ pub(super) fn to_text(bytes: &[u8], sheet: Option<&str>) -> Result<Vec<u8>, Stri
 
 /// Compares the rectangle around the cells of a sheet, which is allocated as a whole, with the limit on memory: two distant cells make it
 /// any size.
-fn check_extent(book: &mut Xlsx<Cursor<&[u8]>>, name: &str) -> Result<(), String> {
+fn check_extent(book: &mut Xlsx<Cursor<Cow<'_, [u8]>>>, name: &str) -> Result<(), String> {
     let Ok(mut cells) = book.worksheet_cells_reader(name) else { return Ok(()) };
     let (mut first, mut last) = ((u32::MAX, u32::MAX), (0, 0));
     while let Ok(Some(cell)) = cells.next_cell() {
