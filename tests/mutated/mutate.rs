@@ -60,13 +60,13 @@ const TOKENS: [&[u8]; 32] = [
     b"                                                                ",
 ];
 
-/// One to six random changes: bytes flipped, removed, repeated, exchanged, tokens inserted.
+/// One to six random changes: bytes flipped, overwritten, removed, repeated, exchanged, tokens inserted.
 fn mutated(seed: &[u8], random: &mut Random) -> Vec<u8> {
     let mut out = seed.to_vec();
     for _ in 0..=random.below(6) {
         let at = random.below(out.len() + 1);
         let to = (at + random.below(24)).min(out.len());
-        match random.below(8) {
+        match random.below(9) {
             0 if at < out.len() => out[at] ^= 1 << random.below(8),
             1 => drop(out.drain(at..to)),
             2 => {
@@ -85,6 +85,12 @@ fn mutated(seed: &[u8], random: &mut Random) -> Vec<u8> {
                 let from = out[at..].iter().position(number).map_or(at, |k| at + k);
                 let end = out[from..].iter().position(|b| !number(b)).map_or(out.len(), |k| from + k);
                 out.splice(from..end, random.pick(&TOKENS[..9]).iter().copied());
+            }
+            // Replaces bytes of a binary number.
+            6 => {
+                let byte = [0, 0x7F, 0xFF, random.next() as u8][random.below(4)];
+                let end = (at + 1 + random.below(4)).min(out.len());
+                out[at..end].fill(byte);
             }
             _ => drop(out.splice(at..at, random.pick(&TOKENS).iter().copied())),
         }

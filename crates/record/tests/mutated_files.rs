@@ -83,39 +83,70 @@ fn mutated_tables_are_inspected_and_a_proposed_map_is_valid() {
     });
 }
 
-fn foreign(name: &str) -> Vec<u8> {
-    std::fs::read(support::root().join("crates/record/tests/foreign").join(name)).expect(name)
+/// Name of the parser, mutations, files, columns.
+type Format = (&'static str, u64, &'static [&'static str], &'static str);
+
+const MATLAB: [Format; 2] = [
+    ("matlab5", 10_000, &["scipy_v5_plain.mat"], ""),
+    (
+        "matlab5.struct",
+        2_000,
+        &["scipy_v5.mat"],
+        r#"Columns(time: (name: "log.t"), position: (name: "log.pz"), force: (name: "log.wrench.3"))"#,
+    ),
+];
+
+#[cfg(feature = "formats")]
+const FORMATS: [Format; 6] = [
+    ("sheets", 2_000, &["machine.xlsx", "machine.ods", "machine.xls"], ""),
+    (
+        "bag",
+        600,
+        &["bag.db3"],
+        r#"Columns(position: (name: "/tip.pose.position.z"), force: (name: "/ft/wrench.wrench.force.z"))"#,
+    ),
+    (
+        "hdf5",
+        2_000,
+        &["matrices.h5"],
+        r#"Columns(position: (name: "tip"), force: (name: "wrench.3"), axis: (0, 6, 8))"#,
+    ),
+    ("parquet", 2_000, &["table.parquet", "timestamp.parquet", "timestamp96.parquet"], ""),
+    (
+        "mcap.json",
+        1_000,
+        &["json.mcap"],
+        r#"Columns(time: (name: "/ft.sensor.log_time"), position: (name: "/pose.position.z"), force: (name: "/ft.sensor.f.2"))"#,
+    ),
+    (
+        "mcap.ros2",
+        1_000,
+        &["ros2.mcap"],
+        r#"Columns(time: (name: "/insertion.header.stamp"), position: (name: "/insertion.position"), force: (name: "/insertion.wrench.force.z"))"#,
+    ),
+];
+
+fn are_read_or_refused(formats: &[Format]) {
+    for (format, count, files, map) in formats {
+        let columns = (!map.is_empty()).then(|| ron::from_str(map).expect("a map"));
+        let options = ReadOptions { columns, repair: false };
+        let file = |name: &&str| {
+            std::fs::read(support::root().join("crates/record/tests/foreign").join(name)).expect(name)
+        };
+        let corpus: Vec<Vec<u8>> = files.iter().map(file).collect();
+        fuzz_any(format, (*count, Target::Text), &corpus, |bytes| {
+            read_csv_bytes(bytes, Path::new("mutated"), &options).is_ok_and(|(read, _)| read.check().is_ok())
+        });
+    }
 }
 
 #[test]
 fn mutated_matlab_files_are_read_or_refused() {
-    let corpus = [foreign("scipy_v5_plain.mat")];
-    fuzz_any("matlab5", (10_000, Target::Text), &corpus, |bytes| {
-        read_csv_bytes(bytes, Path::new("a.mat"), &ReadOptions::default())
-            .is_ok_and(|(recording, _)| recording.check().is_ok())
-    });
-    let map =
-        "Columns(time: (name: \"log.t\"), position: (name: \"log.pz\"), force: (name: \"log.wrench.3\"))";
-    let options = ReadOptions { columns: Some(ron::from_str(map).expect("a map")), repair: false };
-    fuzz_any("matlab5.struct", (2_000, Target::Text), &[foreign("scipy_v5.mat")], |bytes| {
-        read_csv_bytes(bytes, Path::new("a.mat"), &options)
-            .is_ok_and(|(recording, _)| recording.check().is_ok())
-    });
+    are_read_or_refused(&MATLAB);
 }
 
 #[cfg(feature = "formats")]
 #[test]
-fn mutated_sheets_and_bags_are_read_or_refused() {
-    let sheets = [foreign("machine.xlsx"), foreign("machine.ods"), foreign("machine.xls")];
-    fuzz_any("sheets", (2_000, Target::Text), &sheets, |bytes| {
-        read_csv_bytes(bytes, Path::new("a.xlsx"), &ReadOptions::default())
-            .is_ok_and(|(recording, _)| recording.check().is_ok())
-    });
-    let map =
-        "Columns(position: (name: \"/tip.pose.position.z\"), force: (name: \"/ft/wrench.wrench.force.z\"))";
-    let options = ReadOptions { columns: Some(ron::from_str(map).expect("a map")), repair: false };
-    fuzz_any("bag", (600, Target::Text), &[foreign("bag.db3")], |bytes| {
-        read_csv_bytes(bytes, Path::new("a.db3"), &options)
-            .is_ok_and(|(recording, _)| recording.check().is_ok())
-    });
+fn mutated_files_of_other_programs_are_read_or_refused() {
+    are_read_or_refused(&FORMATS);
 }

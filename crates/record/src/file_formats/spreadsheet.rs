@@ -60,15 +60,14 @@ pub(super) fn to_text(bytes: &[u8], sheet: Option<&str>) -> Result<Vec<u8>, Stri
     // Lines have the numbers of the rows.
     let mut text = "\n".repeat(first_row as usize);
     for row in range.rows() {
-        for (at, cell) in row.iter().enumerate() {
-            if at > 0 {
-                text.push('\t');
+        // An empty row is an empty line, however wide the sheet is.
+        if row.iter().any(|cell| !matches!(cell, Data::Empty)) {
+            for (at, cell) in row.iter().enumerate() {
+                if at > 0 {
+                    text.push('\t');
+                }
+                write_cell(&mut text, cell);
             }
-            write_cell(&mut text, cell);
-        }
-        // Trailing empty cells differ from row to row only by formatting.
-        while text.ends_with('\t') && row.iter().all(|cell| matches!(cell, Data::Empty)) {
-            text.pop();
         }
         text.push('\n');
     }
