@@ -4,7 +4,7 @@ use crate::cli::args::CheckArgs;
 use crate::cli::exit_codes::Failure;
 use std::fmt::Write as _;
 use stylet_api::output_folder::check_folder;
-use stylet_api::{DiagnosisInputs, resource_estimate};
+use stylet_api::resource_estimate;
 use stylet_diagnose::check_json::Light;
 use stylet_diagnose::experiment_check::ExperimentCheck;
 use stylet_report::pages::experiment_check::summary_sentence;
@@ -19,15 +19,11 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
         args.results.quiet,
     )?;
     let folder = args.results.output_folder(&args.assumed, "-check");
-    let read = args.results.inputs(&args.assumed, args.data.iter().chain(&args.columns).chain(&args.effects));
+    let read = args
+        .results
+        .inputs(&args.assumed, args.data.iter().chain(&args.reading.columns).chain(&args.effects));
     check_folder(&folder, "check.json", &read)?;
-    let inputs = DiagnosisInputs {
-        scenario: args.assumed.clone(),
-        effects: args.effects.clone(),
-        data: args.data.clone(),
-        columns: args.columns.clone(),
-        repair: args.repair,
-    };
+    let inputs = args.reading.inputs(&args.assumed, &args.data, &args.effects);
     let scenario = inputs.load_scenario()?;
     let report = stylet_api::check(&scenario, &inputs.read_recordings()?)?;
     let output = report.output.with_inputs(read);

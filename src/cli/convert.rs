@@ -15,8 +15,8 @@ use stylet_record::{Recording, read_csv, write_csv};
 pub fn convert(args: &ConvertArgs) -> Result<(), Failure> {
     let encode = encoder(&args.to)?;
     let mut inputs = vec![args.from.as_path()];
-    inputs.extend(args.columns.as_deref());
-    let options = read_options(args.columns.as_deref(), args.repair)?;
+    inputs.extend(args.reading.columns.as_deref());
+    let options = read_options(args.reading.columns.as_deref(), args.reading.repair)?;
     let (recording, notes) = read_csv(&args.from, &options)?;
     let content = encode(&recording, &args.to)?;
     check_own_file(&args.to, &inputs, Some(&content), |_| false)?;

@@ -40,11 +40,11 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
                 .to_owned(),
         ));
     }
-    let inputs = args.inputs(file);
+    let inputs = args.reading.inputs(file, &args.data, &args.effects);
     let scenario = inputs.load_scenario()?;
     args.limits.check(file, &resource_estimate::estimate_diagnose(&args.data), args.results.quiet)?;
     let folder = args.results.output_folder(file, "-diagnosis");
-    let read = args.results.inputs(file, args.data.iter().chain(&args.columns).chain(&args.effects));
+    let read = args.results.inputs(file, args.data.iter().chain(&args.reading.columns).chain(&args.effects));
     check_folder(&folder, "diagnosis.json", &read)?;
     let progress = stage_printer(args.results.quiet, " ...");
     let recordings = inputs.read_recordings()?;

@@ -20,7 +20,7 @@ use stylet_report::significant;
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &DiagnoseArgs, file: &Path) -> Result<(), Failure> {
-    let (inputs, results) = (args.inputs(file), &args.results);
+    let (inputs, results) = (args.reading.inputs(file, &args.data, &args.effects), &args.results);
     let set = load_data_set(&inputs)?;
     let files = recording_files(&set, &args.data)?;
     let estimate = if set.split_by.is_empty() {
@@ -30,7 +30,7 @@ pub fn diagnose(args: &DiagnoseArgs, file: &Path) -> Result<(), Failure> {
     };
     args.limits.check(file, &estimate, results.quiet)?;
     let folder = results.output_folder(file, "-diagnosis");
-    let read = results.inputs(file, files.iter().chain(&args.columns));
+    let read = results.inputs(file, files.iter().chain(&args.reading.columns));
     check_folder(&folder, "diagnosis.json", &read)?;
     let limit = args.limits.start_time_limit(file);
     let runs = set.load_recordings(&files, set.tissue.layers.len())?;

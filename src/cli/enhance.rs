@@ -29,15 +29,16 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
     if let Some(model) = &model {
         model.check_algorithm(&config.enhance)?;
     }
-    let options = read_options(args.columns.as_deref(), args.repair)?;
+    let options = read_options(args.reading.columns.as_deref(), args.reading.repair)?;
     let regressors = match args.compare {
         true => vec![Model::MultiLayer, Model::KelvinVoigt],
         false => vec![config.enhance.model],
     };
     let source = ResultSource { data: &args.data, config: args.config.as_deref(), command: command(args) };
     let folder = args.results.output_folder(&args.data, "");
-    let inputs =
-        args.results.inputs(&args.data, [&args.config, &args.columns, &args.model].into_iter().flatten());
+    let inputs = args
+        .results
+        .inputs(&args.data, [&args.config, &args.reading.columns, &args.model].into_iter().flatten());
     check_folder(&folder, "enhance.json", &inputs)?;
     if let Some(estimate) = resource_estimate::estimate_long_enhance(&args.data, regressors.len()) {
         args.limits.check(&args.data, &estimate, args.results.quiet)?;
@@ -84,7 +85,9 @@ fn refuse_grave(args: &EnhanceArgs, notes: &[QualityNote]) -> Result<(), Failure
 
 fn command(args: &EnhanceArgs) -> String {
     let mut command = format!("stylet enhance {}", args.data.display());
-    for (flag, path) in [("--columns", &args.columns), ("--config", &args.config), ("--model", &args.model)] {
+    for (flag, path) in
+        [("--columns", &args.reading.columns), ("--config", &args.config), ("--model", &args.model)]
+    {
         if let Some(path) = path {
             let _ = write!(command, " {flag} {}", path.display());
         }
@@ -92,7 +95,7 @@ fn command(args: &EnhanceArgs) -> String {
     if let Some(contact) = args.contact {
         let _ = write!(command, " --contact {}", contact.setting().name());
     }
-    for (flag, on) in [("--repair", args.repair), ("--compare", args.compare)] {
+    for (flag, on) in [("--repair", args.reading.repair), ("--compare", args.compare)] {
         if on {
             let _ = write!(command, " {flag}");
         }

@@ -6,7 +6,7 @@ use crate::cli::exit_codes::Failure;
 use crate::cli::terminal_output::stage_printer;
 use std::path::{Path, PathBuf};
 use stylet_api::output_folder::{check_folder, write_file_atomically};
-use stylet_api::{DiagnosisInputs, resource_estimate};
+use stylet_api::resource_estimate;
 use stylet_diagnose::Diagnosis;
 
 /// File with the layers that the diagnosis started from.
@@ -35,8 +35,7 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
     let args = IdentifyArgs {
         data: args.data.clone(),
         layers: None,
-        columns: args.columns.clone(),
-        repair: args.repair,
+        reading: args.reading.clone(),
         results: args.results.clone(),
         limits: args.limits,
     };
@@ -65,14 +64,8 @@ fn run(
     }
     args.limits.check(first, &resource_estimate::estimate_diagnose(&args.data), args.results.quiet)?;
     let folder = args.results.output_folder(first, "-phantom");
-    let inputs = DiagnosisInputs {
-        scenario: folder.join(FOUND_FILE),
-        effects: Vec::new(),
-        data: args.data.clone(),
-        columns: args.columns.clone(),
-        repair: args.repair,
-    };
-    let read = args.results.inputs(first, args.data.iter().skip(1).chain(&args.columns));
+    let inputs = args.reading.inputs(&folder.join(FOUND_FILE), &args.data, &[]);
+    let read = args.results.inputs(first, args.data.iter().skip(1).chain(&args.reading.columns));
     check_folder(&folder, "diagnosis.json", &read)?;
     let recordings = inputs.read_recordings()?;
     let name = first.file_stem().map_or_else(|| "phantom".to_owned(), |s| s.to_string_lossy().into_owned());

@@ -34,13 +34,7 @@ pub fn plan(args: &PlanArgs) -> Result<(), Failure> {
         inputs.effects.extend(args.effects.iter().cloned());
         inputs
     } else {
-        DiagnosisInputs {
-            scenario: from.clone(),
-            effects: args.effects.clone(),
-            data: args.data.clone(),
-            columns: args.columns.clone(),
-            repair: args.repair,
-        }
+        args.reading.inputs(from, &args.data, &args.effects)
     };
     args.resources.check(
         &inputs.scenario,
@@ -161,13 +155,7 @@ fn summary(plan: &Plan) -> String {
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn identifiability(args: &IdentifiabilityArgs) -> Result<(), Failure> {
-    let inputs = DiagnosisInputs {
-        scenario: args.scenario.clone(),
-        effects: args.effects.clone(),
-        data: args.data.clone(),
-        columns: args.columns.clone(),
-        repair: args.repair,
-    };
+    let inputs = args.reading.inputs(&args.scenario, &args.data, &args.effects);
     args.resources.check(
         &inputs.scenario,
         &resource_estimate::estimate_diagnose(&inputs.data),
@@ -176,7 +164,7 @@ pub fn identifiability(args: &IdentifiabilityArgs) -> Result<(), Failure> {
     let limit = args.resources.start_time_limit(&inputs.scenario);
     let progress = stage_printer(args.results.quiet, " ...");
     let folder = args.results.output_folder(&args.scenario, "-identifiability");
-    let others = args.data.iter().chain(&args.columns).chain(&args.motion).chain(&args.effects);
+    let others = args.data.iter().chain(&args.reading.columns).chain(&args.motion).chain(&args.effects);
     let read = args.results.inputs(&args.scenario, others);
     check_folder(&folder, "identifiability.json", &read)?;
     let found = stylet_api::plan_insertion::identifiability(&inputs, args.motion.as_deref(), &progress)?;

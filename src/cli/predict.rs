@@ -26,12 +26,13 @@ pub fn predict(args: &PredictArgs) -> Result<(), Failure> {
     let model = Scenario::load(&file)?;
     args.limits.check(&file, &resource_estimate::estimate_predict(&args.data), args.results.quiet)?;
     let folder = args.results.output_folder(&file, "-prediction");
-    let read = args
-        .results
-        .inputs(&file, args.data.iter().chain(&args.refit_on).chain(&args.columns).chain(&args.assumed));
+    let read = args.results.inputs(
+        &file,
+        args.data.iter().chain(&args.refit_on).chain(&args.reading.columns).chain(&args.assumed),
+    );
     check_folder(&folder, "predict.json", &read)?;
     let ModelOrigin { diagnosis, assumed } = ModelOrigin::of_model_file(&file, args.assumed.as_deref())?;
-    let read_options = read_options(args.columns.as_deref(), args.repair)?;
+    let read_options = read_options(args.reading.columns.as_deref(), args.reading.repair)?;
     let recordings = read_recordings(&args.data, &read_options)?;
     let options = PredictionOptions {
         refit: refitted_parameters(args),

@@ -22,11 +22,16 @@ const OWN_KEY: &[u8] = b"\"median_ratio\"";
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &DiagnoseArgs, model: &Path) -> Result<(), Failure> {
     let file = model_file(model);
-    let group = GroupFiles::new(args.scenario.as_deref(), &args.data, args.columns.as_deref(), args.repair)?;
+    let group = GroupFiles::new(
+        args.scenario.as_deref(),
+        &args.data,
+        args.reading.columns.as_deref(),
+        args.reading.repair,
+    )?;
     args.limits.check(&file, &resource_estimate::estimate_predict(&group.data), args.results.quiet)?;
     let folder = args.results.output_folder(&file, "-transfer");
     let is_file = |p: &&PathBuf| p.is_file();
-    let others = group.data.iter().chain(&args.columns).chain(args.scenario.iter().filter(is_file));
+    let others = group.data.iter().chain(&args.reading.columns).chain(args.scenario.iter().filter(is_file));
     let read = args.results.inputs(&file, others);
     check_folder(&folder, "transfer.json", &read)?;
     let limit = args.limits.start_time_limit(&file);

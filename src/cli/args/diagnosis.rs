@@ -1,10 +1,10 @@
 //! Arguments of `stylet diagnose`, `predict`, `identifiability`, `plan` and `effects`.
 
+use crate::cli::args::ReadingArgs;
 use crate::cli::output_args::OutputArgs;
 use crate::cli::resource_limits::ResourceLimits;
 use clap::Args;
-use std::path::{Path, PathBuf};
-use stylet_api::DiagnosisInputs;
+use std::path::PathBuf;
 
 /// Arguments of `stylet diagnose`.
 #[derive(Debug, Args)]
@@ -39,12 +39,8 @@ pub struct DiagnoseArgs {
     /// Custom effects as further candidates: lists of `Custom(...)` (RON).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub effects: Vec<PathBuf>,
-    /// Column map: names and units of the recordings' columns (RON).
-    #[arg(long, value_name = "FILE")]
-    pub columns: Option<PathBuf>,
-    /// Drop rows with backward or repeated time stamps, and report which.
-    #[arg(long)]
-    pub repair: bool,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Diagnose recordings that `stylet check` calls unusable.
     #[arg(long)]
     pub force: bool,
@@ -52,19 +48,6 @@ pub struct DiagnoseArgs {
     pub results: OutputArgs,
     #[command(flatten)]
     pub limits: ResourceLimits,
-}
-
-impl DiagnoseArgs {
-    /// A scenario with recordings and column map.
-    pub fn inputs(&self, scenario: &Path) -> DiagnosisInputs {
-        DiagnosisInputs {
-            scenario: scenario.to_owned(),
-            effects: self.effects.clone(),
-            data: self.data.clone(),
-            columns: self.columns.clone(),
-            repair: self.repair,
-        }
-    }
 }
 
 /// Arguments of `stylet identify`.
@@ -83,12 +66,8 @@ pub struct IdentifyArgs {
     /// Number of layers [default: as many as the recordings show].
     #[arg(long, value_name = "N")]
     pub layers: Option<usize>,
-    /// Column map: names and units of the recordings' columns (RON).
-    #[arg(long, value_name = "FILE")]
-    pub columns: Option<PathBuf>,
-    /// Drop rows with backward or repeated time stamps, and report which.
-    #[arg(long)]
-    pub repair: bool,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     #[command(flatten)]
     pub results: OutputArgs,
     #[command(flatten)]
@@ -126,12 +105,8 @@ pub struct PredictArgs {
     /// What is the same as when the model was made.
     #[arg(long, value_name = "FACTORS", value_delimiter = ',')]
     pub same: Vec<SameArg>,
-    /// Column map: names and units of the recordings' columns (RON).
-    #[arg(long, value_name = "FILE")]
-    pub columns: Option<PathBuf>,
-    /// Drop rows with backward or repeated time stamps, and report which.
-    #[arg(long)]
-    pub repair: bool,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     #[command(flatten)]
     pub results: OutputArgs,
     #[command(flatten)]
@@ -180,12 +155,8 @@ pub struct CheckArgs {
     /// Custom effects as further candidates: lists of `Custom(...)` (RON).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub effects: Vec<PathBuf>,
-    /// Column map: names and units of the recordings' columns (RON).
-    #[arg(long, value_name = "FILE")]
-    pub columns: Option<PathBuf>,
-    /// Drop rows with backward or repeated time stamps, and report which.
-    #[arg(long)]
-    pub repair: bool,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     #[command(flatten)]
     pub results: OutputArgs,
     #[command(flatten)]
@@ -227,12 +198,8 @@ pub struct IdentifiabilityArgs {
     /// Custom effects as further candidates: lists of `Custom(...)` (RON).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub effects: Vec<PathBuf>,
-    /// Column map: names and units of the recordings' columns (RON).
-    #[arg(long, value_name = "FILE")]
-    pub columns: Option<PathBuf>,
-    /// Drop rows with backward or repeated time stamps, and report which.
-    #[arg(long)]
-    pub repair: bool,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     #[command(flatten)]
     pub results: OutputArgs,
     #[command(flatten)]
@@ -275,12 +242,8 @@ pub struct PlanArgs {
     /// Custom effects as further candidates: lists of `Custom(...)` (RON).
     #[arg(long, value_name = "FILE", num_args = 1..)]
     pub effects: Vec<PathBuf>,
-    /// Column map: names and units of the recordings' columns (RON).
-    #[arg(long, value_name = "FILE")]
-    pub columns: Option<PathBuf>,
-    /// Drop rows with backward or repeated time stamps, and report which.
-    #[arg(long)]
-    pub repair: bool,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Skip the simulated check of the planned insertion: seconds instead of minutes.
     #[arg(long)]
     pub quick: bool,

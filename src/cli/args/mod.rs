@@ -20,7 +20,7 @@ pub use diagnosis::{
 };
 pub use inspect::InspectArgs;
 pub use manual::{CompletionsArgs, ManArgs};
-pub use recordings::{ConvertArgs, EnhanceArgs, ListenArgs};
+pub use recordings::{ConvertArgs, EnhanceArgs, ListenArgs, ReadingArgs};
 pub use simulation::{AlgorithmArg, CompareArgs, ReproduceArgs, RunArgs};
 #[cfg(feature = "studio")]
 pub use studio::StudioArgs;

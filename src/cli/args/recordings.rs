@@ -3,7 +3,32 @@
 use crate::cli::output_args::OutputArgs;
 use crate::cli::resource_limits::ResourceLimits;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use stylet_api::DiagnosisInputs;
+
+/// How recordings are read.
+#[derive(Clone, Debug, Args)]
+pub struct ReadingArgs {
+    /// Column map: names and units of the recordings' columns (RON).
+    #[arg(long, value_name = "FILE")]
+    pub columns: Option<PathBuf>,
+    /// Drop rows with backward or repeated time stamps, and report which.
+    #[arg(long)]
+    pub repair: bool,
+}
+
+impl ReadingArgs {
+    /// A scenario with recordings that are read in this way, and custom effects.
+    pub fn inputs(&self, scenario: &Path, data: &[PathBuf], effects: &[PathBuf]) -> DiagnosisInputs {
+        DiagnosisInputs {
+            scenario: scenario.to_owned(),
+            effects: effects.to_owned(),
+            data: data.to_owned(),
+            columns: self.columns.clone(),
+            repair: self.repair,
+        }
+    }
+}
 
 /// Arguments of `stylet enhance`.
 #[derive(Debug, Args)]
@@ -31,12 +56,8 @@ pub struct EnhanceArgs {
     /// Take the shaft friction from this model: extended.ron of a diagnosis, or any scenario (RON).
     #[arg(long, value_name = "EXTENDED.RON")]
     pub model: Option<PathBuf>,
-    /// Column map: names and units of the recordings' columns (RON).
-    #[arg(long, value_name = "FILE")]
-    pub columns: Option<PathBuf>,
-    /// Drop rows with backward or repeated time stamps, and report which.
-    #[arg(long)]
-    pub repair: bool,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Run both the multi-layer and the Kelvin-Voigt model.
     #[arg(long)]
     pub compare: bool,
@@ -87,12 +108,8 @@ pub struct ConvertArgs {
     pub from: PathBuf,
     /// File to write; the ending .csv, .parquet or .mcap selects the format.
     pub to: PathBuf,
-    /// Column map: names and units of the recordings' columns (RON).
-    #[arg(long, value_name = "FILE")]
-    pub columns: Option<PathBuf>,
-    /// Drop rows with backward or repeated time stamps, and report which.
-    #[arg(long)]
-    pub repair: bool,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
     /// Print nothing but errors.
     #[arg(long, short)]
     pub quiet: bool,
