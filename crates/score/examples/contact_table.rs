@@ -11,7 +11,8 @@
 //! of the others they are wrong.
 //!
 //! Columns: contact within 0.5 mm of the surface; surface inside the contact's 95 % interval; ruptures missed and
-//! false of all; true stiffnesses inside their 95 % intervals; median error of K.
+//! false of all; true stiffnesses inside their 95 % intervals; median error of K; falls of the force at ruptures inside their 95 %
+//! intervals, and their median error.
 #![allow(clippy::print_stdout, reason = "the table")]
 
 use rand::rngs::ChaCha8Rng;
@@ -19,7 +20,7 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 use stylet_core::config::Contact;
-use stylet_core::{EnhanceConfig, Enhancer, LayerEstimate, Output, Sample, Units};
+use stylet_core::{Detection, EnhanceConfig, Enhancer, LayerEstimate, Output, Sample, Units};
 use stylet_score::{ContactAssessor, ContactFinding};
 use stylet_tissue::{ForceLaw, ForceLawState, Layer, PronyTerm, StressRelaxation, Tissue};
 
@@ -31,6 +32,7 @@ const NEAR_M: f64 = 0.5e-3;
 struct Case {
     samples: Vec<Sample>,
     tissue: Tissue,
+    /// Time in s and released force in N.
     ruptures: Vec<(f64, f64)>,
     what: String,
     loaded: bool,
@@ -135,7 +137,7 @@ fn case(kind: &str, seed: u64) -> Case {
     for k in 0..count {
         let t = k as f64 * dt;
         let v = velocity(t);
-        let force = law.step(&mut state, t, z, v, |r| ruptures.push((r.time_s, r.position_m)));
+        let force = law.step(&mut state, t, z, v, |r| ruptures.push((r.time_s, r.released_n)));
         let w: f64 = StandardNormal.sample(&mut rng);
         noise = rho * noise + (1.0_f64 - rho * rho).sqrt() * noise_n * w;
         begun |= z >= from_m;
@@ -161,6 +163,8 @@ struct Row {
     covered: usize,
     estimates: usize,
     errors: Vec<f64>,
+    falls_covered: usize,
+    fall_errors: Vec<f64>,
     zero_steps: usize,
 }
 
@@ -188,14 +192,14 @@ fn judge(row: &mut Row, case: &Case, outs: &[Output], loaded: bool, list: bool) 
     }
     row.cases += 1;
     row.near += usize::from(near);
-    let mut found: Vec<(usize, f64)> = Vec::new();
+    let mut found: Vec<Detection> = Vec::new();
     let mut estimates: Vec<LayerEstimate> = Vec::new();
     for out in outs {
         if let Some(layer) = out.zero_step.and_then(|s| s.withdrawn) {
-            found.retain(|f| f.0 != layer);
+            found.retain(|f| f.layer != layer);
             estimates.retain(|e| e.layer != layer);
         }
-        found.extend(out.detection.map(|d| (d.layer, d.time_s)));
+        found.extend(out.detection);
         if let Some(e) = out.estimate {
             estimates.retain(|x| x.layer != e.layer);
             estimates.push(e);
@@ -207,17 +211,20 @@ fn judge(row: &mut Row, case: &Case, outs: &[Output], loaded: bool, list: bool) 
         format!("{} {}: contact {:?} ± {}", row.cases - 1, case.what, contact.map(mm), mm(1.96 * sd_m));
     let mut used = vec![false; found.len()];
     let bad_before = (row.missed, row.false_alarms, row.covered + row.estimates);
-    for (i, (time_s, _)) in case.ruptures.iter().enumerate() {
+    for (i, (time_s, released_n)) in case.ruptures.iter().enumerate() {
         row.ruptures += 1;
-        let hit =
-            (0..found.len()).find(|&j| !used[j] && found[j].1 > time_s - 0.05 && found[j].1 < time_s + 1.0);
+        let hit = (0..found.len())
+            .find(|&j| !used[j] && found[j].time_s > time_s - 0.05 && found[j].time_s < time_s + 1.0);
         let Some(j) = hit else {
             row.missed += 1;
             line += &format!(", missed {time_s:.2} s");
             continue;
         };
         used[j] = true;
-        let Some(e) = estimates.iter().find(|e| e.layer == found[j].0) else { continue };
+        let off_n = found[j].drop_n - released_n;
+        row.falls_covered += usize::from(off_n.abs() <= 1.96 * found[j].drop_sd_n);
+        row.fall_errors.push(100.0 * (off_n / released_n).abs());
+        let Some(e) = estimates.iter().find(|e| e.layer == found[j].layer) else { continue };
         let truth = case.tissue.layers[i].stiffness_n_per_m;
         let off = e.stiffness_n_per_m - truth;
         row.estimates += 1;
@@ -231,7 +238,7 @@ fn judge(row: &mut Row, case: &Case, outs: &[Output], loaded: bool, list: bool) 
     for (j, used) in used.iter().enumerate() {
         if !used {
             row.false_alarms += 1;
-            line += &format!(", false {:.2} s", found[j].1);
+            line += &format!(", false {:.2} s", found[j].time_s);
         }
     }
     for out in outs {
@@ -256,8 +263,18 @@ fn main() {
     let only = value("--kind").unwrap_or_default();
     let list = args.iter().any(|a| a == "--list");
     println!(
-        "{:10} {:>13} {:>14} {:>12} {:>7} {:>7} {:>14} {:>8} {:>6}",
-        "kind", "near surface", "in interval", "ruptures", "missed", "false", "K covered", "K error", "zero"
+        "{:10} {:>13} {:>14} {:>12} {:>7} {:>7} {:>14} {:>8} {:>6} {:>14} {:>8}",
+        "kind",
+        "near surface",
+        "in interval",
+        "ruptures",
+        "missed",
+        "false",
+        "K covered",
+        "K error",
+        "zero",
+        "falls covered",
+        "error"
     );
     for (k, kind) in KINDS.iter().enumerate().filter(|(_, kind)| only.is_empty() || **kind == only) {
         let mut row = Row::default();
@@ -271,9 +288,12 @@ fn main() {
             }
             judge(&mut row, &case, &outs, loaded, list);
         }
-        row.errors.sort_by(f64::total_cmp);
+        let median = |errors: &mut Vec<f64>| {
+            errors.sort_by(f64::total_cmp);
+            errors.get(errors.len() / 2).copied().unwrap_or(f64::NAN)
+        };
         println!(
-            "{kind:10} {:>5} of {:<5} {:>5} of {:<5} {:>12} {:>7} {:>7} {:>5} of {:<5} {:>7.2}% {:>6}",
+            "{kind:10} {:>5} of {:<5} {:>5} of {:<5} {:>12} {:>7} {:>7} {:>5} of {:<5} {:>7.2}% {:>6} {:>5} of {:<5} {:>7.2}%",
             row.near,
             row.cases,
             row.located,
@@ -283,8 +303,11 @@ fn main() {
             row.false_alarms,
             row.covered,
             row.estimates,
-            row.errors.get(row.errors.len() / 2).copied().unwrap_or(f64::NAN),
+            median(&mut row.errors),
             row.zero_steps,
+            row.falls_covered,
+            row.fall_errors.len(),
+            median(&mut row.fall_errors),
         );
     }
 }
