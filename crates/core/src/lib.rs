@@ -35,8 +35,8 @@ pub use enhancer::Enhancer;
 pub use paper::rls::Rls;
 pub use paper::state_machine::{TRANSITIONS, Transition, Trigger};
 pub use sample::{
-    Baseline, BaselineKind, Cause, Detection, LayerEstimate, MAX_LAYERS, Output, Sample, State, UnusedReason,
-    ZeroStep,
+    Baseline, BaselineKind, Cause, CompletedDrop, Detection, LayerEstimate, MAX_LAYERS, Output, Sample,
+    State, UnusedReason, ZeroStep,
 };
 
 pub use units::Units;

@@ -159,6 +159,17 @@ pub struct Detection {
     pub confidence: f64,
 }
 
+/// The whole fall of the force at a rupture, known up to 0.1 s after its declaration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CompletedDrop {
+    /// Ruptured layer, as in its [`Detection`].
+    pub layer: usize,
+    /// Fall of the force in N.
+    pub drop_n: f64,
+    /// Standard deviation of `drop_n` in N.
+    pub drop_sd_n: f64,
+}
+
 /// Estimate of a traversed layer. Standard deviations are zero where the algorithm does not provide them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LayerEstimate {
@@ -296,6 +307,8 @@ pub struct Output {
     pub zero_step: Option<ZeroStep>,
     /// Rupture declared at this sample.
     pub detection: Option<Detection>,
+    /// Fall of the force at the last rupture, which ended at this sample (`Stylet`).
+    pub completed_drop: Option<CompletedDrop>,
     /// Layer estimate that became available at this sample.
     pub estimate: Option<LayerEstimate>,
     /// False when the sample was ignored; the other fields then repeat the previous output and are not current.
@@ -311,6 +324,7 @@ impl Output {
     /// The output for an ignored sample: the values of the previous one, without its events.
     pub(crate) fn ignore(&mut self, why: UnusedReason) {
         self.detection = None;
+        self.completed_drop = None;
         self.estimate = None;
         self.zero_step = None;
         self.restarted = false;

@@ -1,7 +1,7 @@
 //! Internal units of length and force. The core's constants are made for insertions of centimetres and forces of newtons; recordings
 //! of another scale are converted to units in which they have these magnitudes.
 
-use crate::sample::{Baseline, Detection, LayerEstimate, Output, Sample, ZeroStep};
+use crate::sample::{Baseline, CompletedDrop, Detection, LayerEstimate, Output, Sample, ZeroStep};
 
 /// Smallest travel in m for which metres are the unit of length.
 const MIN_TRAVEL_M: f64 = 5e-4;
@@ -84,6 +84,11 @@ impl Units {
             detection: out.detection.map(|d| Detection {
                 position_m: l * d.position_m,
                 located_m: l * d.located_m,
+                drop_n: f * d.drop_n,
+                drop_sd_n: f * d.drop_sd_n,
+                ..d
+            }),
+            completed_drop: out.completed_drop.map(|d| CompletedDrop {
                 drop_n: f * d.drop_n,
                 drop_sd_n: f * d.drop_sd_n,
                 ..d

@@ -200,6 +200,9 @@ fn judge(row: &mut Row, case: &Case, outs: &[Output], loaded: bool, list: bool) 
             estimates.retain(|e| e.layer != layer);
         }
         found.extend(out.detection);
+        if let (Some(whole), Some(last)) = (out.completed_drop, found.last_mut()) {
+            (last.drop_n, last.drop_sd_n) = (whole.drop_n, whole.drop_sd_n);
+        }
         if let Some(e) = out.estimate {
             estimates.retain(|x| x.layer != e.layer);
             estimates.push(e);

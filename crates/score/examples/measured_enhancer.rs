@@ -63,7 +63,7 @@ fn main() {
     config.stylet.track_retraction = !args.iter().any(|a| a == "--untracked");
     let (mut n_falls, mut found, mut big, mut big_found, mut smaller, mut groundless, mut retraction) =
         (0, 0, 0, 0, 0, 0, 0);
-    let mut delays = vec![];
+    let (mut delays, mut drops, mut covered) = (vec![], vec![], 0);
     let (mut alone, mut behind, mut muscles, mut pulses, mut steps) =
         (vec![], vec![], vec![], vec![], vec![]);
     let mut muscle: Option<(Vec<f64>, Vec<f64>)> = None;
@@ -121,7 +121,16 @@ fn main() {
                     taken[k] = true;
                     found += 1;
                     big_found += usize::from(large);
-                    delays.push(1e3 * (trace.detections[k].time_s - at));
+                    let d = &trace.detections[k];
+                    delays.push(1e3 * (d.time_s - at));
+                    if verbose {
+                        println!(
+                            "   fall {:.3} drop {:.3} ± {:.3} at {:.3} s",
+                            f.size_n, d.drop_n, d.drop_sd_n, d.time_s
+                        );
+                    }
+                    drops.push(d.drop_n / f.size_n);
+                    covered += usize::from((d.drop_n - f.size_n).abs() <= 1.96 * d.drop_sd_n);
                 }
                 None => {
                     line += &format!(
@@ -281,6 +290,11 @@ fn main() {
         "falls {n_falls}: found {found}; of {big} large ones {big_found}; on smaller falls {smaller}, groundless {groundless}, during retraction {retraction}; delay median {:.0} p95 {:.0} ms",
         q(0.5),
         q(0.95)
+    );
+    drops.sort_by(f64::total_cmp);
+    println!(
+        "  {covered} of {found} falls inside the 95 % interval of the drop, which is {:.2} of the fall (median)",
+        drops.get(drops.len() / 2).copied().unwrap_or(f64::NAN)
     );
     let root = |v: &[(f64, f64)], k: usize| rms(v.iter().map(|x| if k == 0 { x.0 } else { x.1 }));
     println!(

@@ -194,6 +194,11 @@ impl Trace {
             self.zero_steps.push(step);
         }
         self.detections.extend(out.detection);
+        if let (Some(whole), Some(last)) = (out.completed_drop, self.detections.last_mut())
+            && last.layer == whole.layer
+        {
+            (last.drop_n, last.drop_sd_n) = (whole.drop_n, whole.drop_sd_n);
+        }
         if let Some(estimate) = out.estimate {
             // A later estimate of a layer replaces the earlier one, which is among the last.
             let since_restart = self.estimates_since_restart();

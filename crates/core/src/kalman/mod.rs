@@ -6,6 +6,7 @@ mod air_history;
 mod air_sums;
 mod baseline;
 mod baseline_fit;
+mod completed_drop;
 mod contact_detection;
 mod cusum;
 mod force_predictor;
@@ -64,6 +65,7 @@ impl KalmanEnhancer {
     #[inline]
     pub(crate) fn step(&mut self, config: &EnhanceConfig, surface_m: f64, sample: Sample) -> &Output {
         self.output.detection = None;
+        self.output.completed_drop = None;
         self.output.estimate = None;
         self.output.zero_step = None;
         self.output.restarted = false;

@@ -1,5 +1,6 @@
 //! Rupture detection: tracks force drops, tests them against noise and texture, and updates all filters at a rupture.
 
+use super::completed_drop::ContinuedDrop;
 use super::force_predictor::{MEMORY_M, MotionStep};
 use super::motion::SPEED_TIME_CONSTANT_S;
 use super::state::{
@@ -12,7 +13,7 @@ use crate::sample::{Cause, Detection, Sample};
 /// Samples that the level of a candidate is averaged over at most.
 const MAX_AVERAGED_SAMPLES: f64 = 16.0;
 /// Size of a drop in standard deviations where the base law is rejected: outside its 95 % interval.
-const LIKELY_DROP_SDS: f64 = 2.0;
+pub(super) const LIKELY_DROP_SDS: f64 = 2.0;
 /// Smallest drop before the base law is confirmed, as a share of the largest force: the elastic share of the prior at contact.
 const UNCONFIRMED_DROP_SHARE: f64 = 0.5;
 /// Squared distance in variances within which two estimates of a drop's onset agree.
@@ -35,6 +36,7 @@ impl KalmanEnhancer {
             // What had accumulated was noise.
             (self.candidate, self.level_before_fall_n) = (None, self.predictor.level_n());
         }
+        let max_count = self.averaged_samples();
         let candidate = self.candidate.get_or_insert(DropCandidate {
             from_n: self.level_before_fall_n,
             mean_n: sample.force_n,
@@ -50,13 +52,6 @@ impl KalmanEnhancer {
         }
         candidate.duration_s += step.dt_s;
         candidate.count += 1.0;
-        // As many samples as give the force to a quarter of the smallest drop.
-        let max_count = if self.min_drop_n > 0.0 {
-            16.0 * self.noise.marginal_variance() / (self.min_drop_n * self.min_drop_n)
-        } else {
-            MAX_AVERAGED_SAMPLES
-        };
-        let max_count = at_least(1.0, at_most(MAX_AVERAGED_SAMPLES, max_count));
         let gain = 1.0 / candidate.count.min(max_count);
         candidate.mean_n += gain * (sample.force_n - candidate.mean_n);
         let missing_n = self.snapshot.predict(sample.position_m, self.friction_drive_mps) - sample.force_n;
@@ -67,6 +62,16 @@ impl KalmanEnhancer {
             // Too slow or too small.
             self.reset_detector();
         }
+    }
+
+    /// As many samples as give the force to a quarter of the smallest drop.
+    pub(super) fn averaged_samples(&self) -> f64 {
+        let max_count = if self.min_drop_n > 0.0 {
+            16.0 * self.noise.marginal_variance() / (self.min_drop_n * self.min_drop_n)
+        } else {
+            MAX_AVERAGED_SAMPLES
+        };
+        at_least(1.0, at_most(MAX_AVERAGED_SAMPLES, max_count))
     }
 
     /// True if the candidate exceeds noise and texture.
@@ -134,6 +139,11 @@ impl KalmanEnhancer {
         self.decide_rival_at_rupture(sample, self.snapshot_m);
         let bias = self.noise.bias_n();
         self.rival = self.rival_of_rupture(sample);
+        let (drop_n, sd_n) = self.last_drop_n;
+        // Texture adds to the noise.
+        let drop_sd_n = sd_n * libm::sqrt(self.innovation_widening());
+        let level_n = self.candidate.map_or(sample.force_n, |candidate| candidate.mean_n);
+        self.continued_drop = Some(ContinuedDrop { drop_n, sd_n: drop_sd_n, lowest_n: level_n, level_n });
         let span = (sample.position_m - self.snapshot_m).max(0.0);
         // A rupture shown by one sample lies half a step before it; one accumulated over many began where the sum left zero,
         // to within a step.
@@ -168,7 +178,6 @@ impl KalmanEnhancer {
         self.dry_friction.rupture(sample.position_m, self.force_without_baseline_n(sample));
         // At the threshold a rupture is twice as likely as a false alarm; the excess adds to its log odds.
         let confidence = 1.0 / (1.0 + libm::exp(-(excess_nats + core::f64::consts::LN_2)));
-        let (drop_n, drop_sd_n) = self.last_drop_n;
         self.output.detection = Some(Detection {
             layer: self.output.ruptures,
             time_s: sample.time_s,

@@ -1,6 +1,7 @@
 //! State of the algorithm between samples.
 
 use super::baseline::AirBaseline;
+use super::completed_drop::ContinuedDrop;
 use super::cusum::CusumBank;
 use super::force_predictor::ForcePredictor;
 use super::free_tip::FreeTipDetector;
@@ -86,6 +87,8 @@ pub(crate) struct KalmanEnhancer {
     /// Size of the last drop candidate and its standard deviation, in N.
     pub(super) last_drop_n: (f64, f64),
     pub(super) level_before_fall_n: f64,
+    /// The drop of the last rupture, while it may continue.
+    pub(super) continued_drop: Option<ContinuedDrop>,
     pub(super) dry_friction: DryShaftFriction,
     /// The base law is rejected; friction is modelled as dry.
     pub(super) base_law_failed: bool,
@@ -175,6 +178,7 @@ impl KalmanEnhancer {
             candidate: None,
             last_drop_n: (0.0, 0.0),
             level_before_fall_n: 0.0,
+            continued_drop: None,
             dry_friction: DryShaftFriction::default(),
             base_law_failed: false,
             release_window_s: 0.0,

@@ -79,7 +79,10 @@ impl KalmanEnhancer {
             self.predictor.restart(force_n, force.max(sd), &self.noise, step.speed_mps, false);
         }
         self.spike_samples = 0;
-        let widening = 1.0 + self.misfit_weight * at_least(0.0, self.roughness - 1.0);
+        if forward && !outlier {
+            self.follow_drop(sample);
+        }
+        let widening = self.innovation_widening();
         let alarm_z = if widening > 1.0 { z / libm::sqrt(widening) } else { z };
         let layer_innovation = if forward && !outlier { self.layer_innovation(step, sample) } else { None };
         let better = layer_innovation.as_ref().filter(|layer| layer.s < innovation.s);
@@ -155,6 +158,12 @@ impl KalmanEnhancer {
             self.next_report_at = self.next_report_at.saturating_mul(2);
             self.report_previous_layer(sample);
         }
+    }
+
+    /// Variance of the recent innovations over that of the noise, where the base law fails.
+    #[inline(always)]
+    pub(super) fn innovation_widening(&self) -> f64 {
+        1.0 + self.misfit_weight * at_least(0.0, self.roughness - 1.0)
     }
 
     /// Updates the layer estimator and the misfit of the base law.

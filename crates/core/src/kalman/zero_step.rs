@@ -199,6 +199,7 @@ impl KalmanEnhancer {
         self.dry_friction = rival.dry_friction;
         (self.samples_since_rupture, self.next_report_at, self.time_since_rupture_s) = rival.counts;
         (self.post_rupture, self.drop_continues, self.drop_onset) = (None, false, None);
+        self.continued_drop = None;
         self.free_tip.restart_from(&self.estimator);
         self.reset_detector();
         (self.snapshot, self.snapshot_m) = (self.estimator, self.last_sample.position_m);
