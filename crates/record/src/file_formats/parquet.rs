@@ -5,9 +5,10 @@ use crate::memory_limit::{self, VALUE_BYTES};
 use crate::units::{Unit, parse_unit};
 use bytes::Bytes;
 use parquet::basic::{ConvertedType, LogicalType, TimeUnit};
+use parquet::column::page::Page;
 use parquet::column::reader::ColumnReader;
 use parquet::data_type::DataType;
-use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
 /// An open file.
@@ -40,6 +41,17 @@ impl File {
 
 fn damaged(why: impl std::fmt::Display) -> String {
     format!("it cannot be read ({why}); is it complete?")
+}
+
+/// Rejects a dictionary, the first page of a column, with more values than bytes: the library allocates them before it reads them.
+fn check_dictionary(group: &dyn RowGroupReader, column: usize) -> Result<(), String> {
+    let first = group.get_column_page_reader(column).map_err(damaged)?.next();
+    match first.transpose().map_err(damaged)? {
+        Some(Page::DictionaryPage { buf, num_values, .. }) if num_values as usize > buf.len() => {
+            Err(damaged(format!("a dictionary of {num_values} values in {} bytes", buf.len())))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Rows per read.
@@ -151,6 +163,7 @@ impl NumericColumns for File {
             let mut out = Vec::new();
             for group in 0..self.reader.num_row_groups() {
                 let group = self.reader.get_row_group(group).map_err(damaged)?;
+                check_dictionary(group.as_ref(), index)?;
                 match group.get_column_reader(index).map_err(damaged)? {
                     ColumnReader::DoubleColumnReader(mut r) => {
                         read(&mut r, optional, (&mut out, rows), |x| *x)?
