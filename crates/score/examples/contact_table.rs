@@ -113,7 +113,7 @@ fn case(kind: &str, seed: u64) -> Case {
         }
         "step" => {
             let (n, at) = (signed(&mut rng, 0.2, 5.0), between(&mut rng, 0.5, duration_s - 0.5));
-            what = format!("step {n:.2} N at {at:.2} s");
+            what = format!("step {n:.3} N at {at:.2} s");
             disturb = Box::new(move |t, _| if t < at { 0.0 } else { n });
         }
         "loaded" => {
@@ -246,7 +246,7 @@ fn judge(row: &mut Row, case: &Case, outs: &[Output], loaded: bool, list: bool) 
     }
     for out in outs {
         if let Some(s) = out.zero_step {
-            line += &format!(", zero {:+.2} N at {:.2} s", s.size_n, s.time_s);
+            line += &format!(", zero {:+.3} ± {:.3} N at {:.2} s", s.size_n, 1.96 * s.sd_n, s.time_s);
         }
     }
     if let Some(b) = outs.last().map(|o| o.baseline) {

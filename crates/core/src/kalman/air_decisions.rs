@@ -102,7 +102,9 @@ impl KalmanEnhancer {
             sd = libm::sqrt(sd * sd + fit.p[0][0]);
         }
         self.start_contact(config, step, sample, sample.position_m, rise, rise + 3.0 * sd);
-        if moving {
+        let unknown =
+            if moving { Some(fit) } else { self.baseline.history.doubtful_constant(evidence, sample) };
+        if let Some(fit) = unknown {
             self.set_estimator_baseline(&fit);
         }
         self.set_onset(evidence);

@@ -96,6 +96,8 @@ pub(super) struct AirEvidence {
     pub(super) constant_nats: f64,
     /// A bend, with a constant offset.
     pub(super) constant_bend_nats: f64,
+    /// A bend, with a moving baseline.
+    pub(super) moving_bend: Hypothesis,
     /// Posterior mean of the bend's onset in m and its standard deviation.
     pub(super) onset_m: (f64, f64),
     /// Excess of the block variance over that of the noise, 1 or more.
@@ -118,6 +120,11 @@ impl AirEvidence {
     /// Probability of a contact.
     pub(super) fn contact_probability(&self) -> f64 {
         1.0 / (1.0 + libm::exp(-self.contact_nats()))
+    }
+
+    /// Probability of a moving baseline before a bend.
+    pub(super) fn moving_probability(&self) -> f64 {
+        1.0 / (1.0 + libm::exp(self.constant_bend_nats - self.moving_bend.nats))
     }
 
     /// Log odds of a step of the zero against everything else.
@@ -384,6 +391,7 @@ impl AirHistory {
                 bend: Hypothesis::none(),
                 constant_nats: -0.5 * residual(Form::Constant) / excess,
                 constant_bend_nats: f64::NEG_INFINITY,
+                moving_bend: Hypothesis::none(),
                 onset_m: (0.0, 0.0),
                 excess,
                 total,
@@ -401,9 +409,12 @@ impl AirHistory {
                 nats: base + step[k].nats / excess - event - STEP_PRIOR_NATS,
                 ..step[k]
             });
-            out.bend.improve(Hypothesis { nats: base + bend[k].nats / excess - event, ..bend[k] });
+            let bend = Hypothesis { nats: base + bend[k].nats / excess - event, ..bend[k] };
+            out.bend.improve(bend);
             if form == Form::Constant {
                 out.constant_bend_nats = out.bend.nats;
+            } else {
+                out.moving_bend.improve(bend);
             }
         }
         let form = usize::from(out.bend.form != Form::Constant);

@@ -10,6 +10,9 @@ const INSEPARABLE: f64 = 0.99;
 /// Log odds between drift and line from which the more probable one is reported.
 const NAMING_NATS: f64 = 3.0;
 
+/// Probability from which drift and line of a baseline that is more probably constant are unknowns.
+const MIN_MOVING_PROBABILITY: f64 = 0.05;
+
 /// A baseline fitted to the samples in air, referred to `time_s` and `position_m`.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BaselineFit {
@@ -62,6 +65,25 @@ impl AirHistory {
         let fit = self.fit(evidence, &evidence.total.before(&evidence.bend.sums), evidence.bend.form, at);
         let sure = evidence.bend.nats - evidence.constant_bend_nats > DECISION_NATS;
         BaselineFit { kind: if sure { fit.kind } else { BaselineKind::Constant }, ..fit }
+    }
+
+    /// The constant baseline before a bend, with the covariance of its mixture with a moving one; `None` if that is improbable.
+    pub(super) fn doubtful_constant(&self, evidence: &AirEvidence, at: &Sample) -> Option<BaselineFit> {
+        let probability = evidence.moving_probability();
+        if probability < MIN_MOVING_PROBABILITY {
+            return None;
+        }
+        let mut constant = self.fit_before_bend(evidence, at);
+        let bend = &evidence.moving_bend;
+        let moving = self.fit(evidence, &evidence.total.before(&bend.sums), bend.form, at);
+        let apart = [moving.x[0] - constant.x[0], moving.x[1], moving.x[2]];
+        constant.p[0][0] *= 1.0 - probability;
+        for i in 0..3 {
+            for j in 0..3 {
+                constant.p[i][j] += probability * (moving.p[i][j] + apart[i] * apart[j]);
+            }
+        }
+        Some(constant)
     }
 
     /// The baseline behind a step, whose level is known from the samples behind it alone.

@@ -70,6 +70,8 @@ pub(crate) struct LayerEstimator {
     last: Option<[f64; 4]>,
     /// The baseline moves: drift and line are unknowns.
     moving_baseline: bool,
+    /// Variance in N² that steps of the zero have added to the bias.
+    pub(super) zero_step_variance: f64,
     /// Position of the contact in m, and time since then in s.
     contact_m: f64,
     pub(super) elapsed_s: f64,
@@ -124,6 +126,7 @@ impl LayerEstimator {
             onset_m: None,
             last: None,
             moving_baseline: false,
+            zero_step_variance: 0.0,
             contact_m: start_m,
             elapsed_s: 0.0,
         }
@@ -144,9 +147,10 @@ impl LayerEstimator {
         self.moving_baseline = true;
     }
 
-    /// Adds a variance in N² to the sensor bias.
+    /// Adds the variance in N² of a step of the zero to the sensor bias.
     pub(super) fn widen_bias(&mut self, variance: f64, noise: &NoiseEstimator) {
         self.belief.p[BIAS][BIAS] += variance / noise.variance;
+        self.zero_step_variance += variance;
     }
 
     /// Error of the subtracted drift and line at a position, in N, and its variance in N²; `None` with a constant baseline.
@@ -331,7 +335,8 @@ impl LayerEstimator {
         self.transform(&map);
         if self.start_sd_m > 0.0 {
             // The bias estimate has absorbed the error in the ruptured layer's start.
-            self.belief.reset_component(BIAS, noise.bias_n(), noise.bias_variance() * unit);
+            let variance = noise.bias_variance() + self.zero_step_variance;
+            self.belief.reset_component(BIAS, noise.bias_n(), variance * unit);
         }
         self.start_layer(slope, sd_m, (stiffness, b), drive, unit);
         (self.previous_start_sd_m, self.start_sd_m, self.gap_m) = (self.start_sd_m, 0.0, 0.0);

@@ -191,6 +191,7 @@ impl KalmanEnhancer {
         let variance = rival.estimator.belief.p[BIAS][BIAS] * self.noise.variance;
         self.estimator = rival.estimator;
         self.estimator.belief.x[BIAS] = rival.bias_n;
+        self.estimator.zero_step_variance = variance;
         self.baseline.subtract_step(size_n);
         self.predictor.shift_level(-size_n);
         self.skip_sample();
