@@ -231,9 +231,9 @@ fn with_moving_baseline(mut stylet: KalmanEnhancer) -> KalmanEnhancer {
 }
 
 #[test]
-fn friction_of_a_model_and_dry_friction_are_compared_with_the_force_without_a_moving_baseline() {
-    // The force lies 0.5 N above the baseline, all of which is friction just after a rupture.
-    let moved = Sample { force_n: 0.07 + 0.15 + 0.5, ..at(0.002) };
+fn where_the_base_law_fails_its_drift_is_not_subtracted_before_friction_is_compared() {
+    // The force lies 0.5 N above the offset, all of which is friction just after a rupture.
+    let moved = Sample { force_n: 0.07 + 0.5, ..at(0.002) };
     for (model_n, friction_n) in [(0.3, 0.3), (0.6, 0.5)] {
         let mut stylet = with_moving_baseline(second());
         stylet.base_law_failed = true;
