@@ -11,7 +11,7 @@ const INSEPARABLE: f64 = 0.99;
 const NAMING_NATS: f64 = 3.0;
 
 /// Probability from which drift and line of a baseline that is more probably constant are unknowns.
-const MIN_MOVING_PROBABILITY: f64 = 0.05;
+const MIN_MOVING_PROBABILITY: f64 = 0.1;
 
 /// A baseline fitted to the samples in air, referred to `time_s` and `position_m`.
 #[derive(Clone, Copy, Debug, Default)]
