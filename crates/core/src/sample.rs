@@ -159,7 +159,7 @@ pub struct Detection {
     pub confidence: f64,
 }
 
-/// The whole fall of the force at a rupture, known up to 0.1 s after its declaration.
+/// The fall of the force at a rupture until 0.1 s after its declaration. Not reported if the recording ends before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CompletedDrop {
     /// Ruptured layer, as in its [`Detection`].

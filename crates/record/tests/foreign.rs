@@ -64,6 +64,17 @@ fn ros_2_messages_in_cdr_are_read_by_the_definition_in_the_file() {
 }
 
 #[test]
+fn a_dictionary_of_more_values_than_bytes_is_refused_before_it_is_allocated() {
+    let mut bytes = std::fs::read(file("table.parquet")).expect("a file");
+    // The dictionary's header, with 60 values.
+    let head = [0x4C, 0x15, 0x78];
+    let at = bytes.windows(3).position(|three| three == head).expect("a dictionary");
+    bytes.splice(at..at + 3, [0x4C, 0x15, 0xFE, 0xFF, 0xFF, 0xFF, 0x0F]);
+    let error = read_csv_bytes(&bytes, Path::new("a.parquet"), &ReadOptions::default()).expect_err("damaged");
+    assert!(error.to_string().contains("a dictionary of 2147483647 values"), "{error}");
+}
+
+#[test]
 fn round_trips_keep_every_sample() {
     let (mut r, _) = read_csv(file("table.parquet"), &ReadOptions::default()).expect("a recording");
     r.velocity_mps = r.time_s.iter().map(|t| 0.1 + t / 3.0).collect();

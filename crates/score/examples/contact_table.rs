@@ -195,14 +195,16 @@ fn judge(row: &mut Row, case: &Case, outs: &[Output], loaded: bool, list: bool) 
     let mut found: Vec<Detection> = Vec::new();
     let mut estimates: Vec<LayerEstimate> = Vec::new();
     for out in outs {
+        if let Some(whole) = out.completed_drop
+            && let Some(d) = found.iter_mut().rfind(|d| d.layer == whole.layer)
+        {
+            (d.drop_n, d.drop_sd_n) = (whole.drop_n, whole.drop_sd_n);
+        }
         if let Some(layer) = out.zero_step.and_then(|s| s.withdrawn) {
             found.retain(|f| f.layer != layer);
             estimates.retain(|e| e.layer != layer);
         }
         found.extend(out.detection);
-        if let (Some(whole), Some(last)) = (out.completed_drop, found.last_mut()) {
-            (last.drop_n, last.drop_sd_n) = (whole.drop_n, whole.drop_sd_n);
-        }
         if let Some(e) = out.estimate {
             estimates.retain(|x| x.layer != e.layer);
             estimates.push(e);

@@ -184,6 +184,12 @@ impl Trace {
             self.recorded_before_restart = self.recorded;
         }
         self.recorded += 1;
+        if let Some(whole) = out.completed_drop
+            && let Some(d) =
+                self.detections.iter_mut().skip(self.first_detection).rfind(|d| d.layer == whole.layer)
+        {
+            (d.drop_n, d.drop_sd_n) = (whole.drop_n, whole.drop_sd_n);
+        }
         if let Some(step) = out.zero_step {
             // A step of the zero that was first declared as a rupture.
             if let Some(layer) = step.withdrawn {
@@ -194,11 +200,6 @@ impl Trace {
             self.zero_steps.push(step);
         }
         self.detections.extend(out.detection);
-        if let (Some(whole), Some(last)) = (out.completed_drop, self.detections.last_mut())
-            && last.layer == whole.layer
-        {
-            (last.drop_n, last.drop_sd_n) = (whole.drop_n, whole.drop_sd_n);
-        }
         if let Some(estimate) = out.estimate {
             // A later estimate of a layer replaces the earlier one, which is among the last.
             let since_restart = self.estimates_since_restart();
@@ -337,7 +338,7 @@ pub fn model_name(model: Model) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::Trace;
-    use stylet_core::{Cause, Detection, Output, ZeroStep};
+    use stylet_core::{Cause, CompletedDrop, Detection, Output, ZeroStep};
 
     #[test]
     fn a_step_of_the_zero_withdraws_no_rupture_from_before_a_restart() {
@@ -364,6 +365,10 @@ mod tests {
         trace.record_events(&Output { detection: Some(rupture(1.0)), used: true, ..Output::default() });
         trace.record_events(&Output { restarted: true, used: true, ..Output::default() });
         trace.record_events(&Output { detection: Some(rupture(1.5)), used: true, ..Output::default() });
+        let whole = CompletedDrop { layer: 1, drop_n: 2.0, drop_sd_n: 0.1 };
+        trace.record_events(&Output { completed_drop: Some(whole), used: true, ..Output::default() });
+        let drops: Vec<f64> = trace.detections.iter().map(|d| d.drop_n).collect();
+        assert_eq!(drops, [0.0, 2.0], "the drop of the rupture since the restart");
         trace.record_events(&Output { zero_step: Some(step), used: true, ..Output::default() });
         assert_eq!(trace.detections, [rupture(1.0)]);
     }

@@ -186,16 +186,16 @@ impl KalmanEnhancer {
             sd: [libm::sqrt(self.noise.bias_variance()), 0.0, 0.0],
             zero_steps: baseline.zero_steps,
         };
-        if baseline.moving {
-            let (mean, sd) = if self.in_tissue {
-                self.estimator.baseline_residual(&self.noise)
-            } else {
-                let p = &baseline.fit.p;
-                ([0.0; 2], [libm::sqrt(at_least(0.0, p[1][1])), libm::sqrt(at_least(0.0, p[2][2]))])
-            };
-            out.drift_n_per_s += mean[0];
-            out.line_n_per_m += mean[1];
-            out.sd = [out.sd[0], sd[0], sd[1]];
+        if self.in_tissue {
+            let (mean, sd) = self.estimator.baseline_residual(&self.noise);
+            if !self.base_law_failed {
+                out.drift_n_per_s += mean[0];
+                out.line_n_per_m += mean[1];
+            }
+            (out.sd[1], out.sd[2]) = (sd[0], sd[1]);
+        } else if baseline.moving {
+            let p = &baseline.fit.p;
+            (out.sd[1], out.sd[2]) = (libm::sqrt(at_least(0.0, p[1][1])), libm::sqrt(at_least(0.0, p[2][2])));
         }
         out
     }

@@ -147,10 +147,9 @@ impl LayerEstimator {
         self.moving_baseline = true;
     }
 
-    /// Adds the variance in N² of a step of the zero to the sensor bias.
+    /// Adds a variance in N² to the sensor bias.
     pub(super) fn widen_bias(&mut self, variance: f64, noise: &NoiseEstimator) {
         self.belief.p[BIAS][BIAS] += variance / noise.variance;
-        self.zero_step_variance += variance;
     }
 
     /// Error of the subtracted drift and line at a position, in N, and its variance in N²; `None` with a constant baseline.
@@ -177,8 +176,11 @@ impl LayerEstimator {
         if self.moving_baseline { 2 * (512 - 216) + 2 * (288 - 126) } else { 0 }
     }
 
-    /// Corrections of the subtracted drift (N/s) and line (N/m), and their standard deviations.
+    /// Corrections of the subtracted drift (N/s) and line (N/m), and their standard deviations; zero with a constant baseline.
     pub(super) fn baseline_residual(&self, noise: &NoiseEstimator) -> ([f64; 2], [f64; 2]) {
+        if !self.moving_baseline {
+            return Default::default();
+        }
         let g = &self.belief;
         let sd = |i: usize| libm::sqrt(at_least(0.0, g.p[i][i]) * noise.variance);
         ([g.x[DRIFT], g.x[LINE]], [sd(DRIFT), sd(LINE)])

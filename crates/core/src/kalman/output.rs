@@ -99,11 +99,11 @@ impl KalmanEnhancer {
 
     /// What remains of a moving baseline in the force of a sample, in N, and its variance in N².
     #[inline(always)]
-    fn baseline_residual_n(&self, sample: &Sample) -> (f64, f64) {
+    pub(super) fn baseline_residual_n(&self, sample: &Sample) -> (f64, f64) {
         let residual = self.estimator.baseline_residual_n(sample.position_m, &self.noise);
         let (residual_n, variance) = residual.unwrap_or((0.0, 0.0));
         // Where the base law fails, its misfit looks like a drift.
-        (if self.base_law_failed { 0.0 } else { residual_n }, variance)
+        if self.base_law_failed { (0.0, variance + residual_n * residual_n) } else { (residual_n, variance) }
     }
 
     /// Force of a sample without the sensor's baseline, in N.

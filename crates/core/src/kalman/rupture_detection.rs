@@ -143,7 +143,7 @@ impl KalmanEnhancer {
         // Texture adds to the noise.
         let drop_sd_n = sd_n * libm::sqrt(self.innovation_widening());
         let level_n = self.candidate.map_or(sample.force_n, |candidate| candidate.mean_n);
-        self.continued_drop = Some(ContinuedDrop { drop_n, sd_n: drop_sd_n, lowest_n: level_n, level_n });
+        self.continued_drop = Some(ContinuedDrop::new(drop_n, drop_sd_n, level_n));
         let span = (sample.position_m - self.snapshot_m).max(0.0);
         // A rupture shown by one sample lies half a step before it; one accumulated over many began where the sum left zero,
         // to within a step.

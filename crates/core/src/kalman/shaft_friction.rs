@@ -56,6 +56,12 @@ impl DryShaftFriction {
         self.retraction = None;
     }
 
+    /// All later forces are larger by `by_n`.
+    pub(crate) fn shift(&mut self, by_n: f64) {
+        self.smoothed_n += by_n;
+        self.level_n = at_least(0.0, self.level_n + by_n);
+    }
+
     /// Takes a sample; returns friction in N and its standard deviation.
     #[inline(always)]
     pub(crate) fn update(&mut self, sample: &ShaftSample) -> (f64, f64) {

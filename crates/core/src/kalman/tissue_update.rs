@@ -31,6 +31,7 @@ impl KalmanEnhancer {
         let force_n = sample.force_n;
         self.restart_if_invalid(config, step, sample);
         self.update_stop(step, sample);
+        self.complete_drop();
         self.estimator.elapsed_s += step.dt_s;
         self.operations += OPERATIONS_PER_PREDICTION;
         self.predictor.advance(step, &self.noise);
@@ -80,7 +81,7 @@ impl KalmanEnhancer {
         }
         self.spike_samples = 0;
         if forward && !outlier {
-            self.follow_drop(sample);
+            self.follow_drop(step, sample);
         }
         let widening = self.innovation_widening();
         let alarm_z = if widening > 1.0 { z / libm::sqrt(widening) } else { z };
@@ -227,6 +228,8 @@ impl KalmanEnhancer {
         if self.misfit >= FAILED_MISFIT
             && self.deepest_m - self.contact_sample_m >= config.guard.blind_travel_m
         {
+            // From here on the estimated drift is not subtracted.
+            self.dry_friction.shift(self.baseline_residual_n(sample).0);
             self.base_law_failed = true;
         }
         self.min_drop_n = weight * config.stylet.min_drop_share * self.peak_force_n;

@@ -64,6 +64,7 @@ impl KalmanEnhancer {
             self.baseline.history.absorb_last_samples(usize::from(count), size_n);
         }
         self.estimator.widen_bias(variance, &self.noise);
+        self.estimator.zero_step_variance += variance;
         self.skip_sample();
         self.jump = Jump::default();
         self.spike_samples = 0;
@@ -200,7 +201,7 @@ impl KalmanEnhancer {
         self.dry_friction = rival.dry_friction;
         (self.samples_since_rupture, self.next_report_at, self.time_since_rupture_s) = rival.counts;
         (self.post_rupture, self.drop_continues, self.drop_onset) = (None, false, None);
-        self.continued_drop = None;
+        (self.continued_drop, self.output.completed_drop) = (None, None);
         self.free_tip.restart_from(&self.estimator);
         self.reset_detector();
         (self.snapshot, self.snapshot_m) = (self.estimator, self.last_sample.position_m);

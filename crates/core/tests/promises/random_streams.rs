@@ -322,6 +322,14 @@ impl Judge {
                 return Some("detection");
             }
         }
+        if let Some(d) = out.completed_drop
+            && (!finite(&[d.drop_n, d.drop_sd_n])
+                || d.drop_sd_n < 0.0
+                || d.layer == 0
+                || d.layer > out.ruptures)
+        {
+            return Some("completed drop");
+        }
         if let Some(e) = out.estimate {
             let numbers = [e.start_m, e.stiffness_n_per_m, e.friction, e.drop_n, e.added_friction_ns_per_m];
             let sds = [e.stiffness_sd, e.friction_sd, e.drop_sd_n, e.cumulative_sd];

@@ -2,7 +2,7 @@
 //! its size; up to three outliers are a spike.
 
 use crate::support::{Insertion, enhance, gels, insertion, lasting, stylet};
-use stylet_core::{Detection, Output, Sample};
+use stylet_core::{CompletedDrop, Detection, Output, Sample};
 
 /// The paper's three gels with drops that last `drop_s`.
 fn soft(seed: u64, drop_s: f64) -> Insertion {
@@ -40,6 +40,11 @@ fn a_drop_that_takes_up_to_a_tenth_of_a_second_is_one_rupture() {
                 let delay_s = d.time_s - rupture.time_s;
                 assert!((0.0..=drop_s).contains(&delay_s), "seed {seed}, {drop_s} s: {delay_s} s late");
             }
+            let whole: Vec<CompletedDrop> = outputs.iter().filter_map(|o| o.completed_drop).collect();
+            assert_eq!(whole.len(), 3, "seed {seed}, {drop_s} s: {whole:?}");
+            for (w, rupture) in whole.iter().zip(&data.ruptures) {
+                assert!((w.drop_n - rupture.released_n).abs() < 5.0 * 0.02, "{w:?} for {rupture:?}");
+            }
             // Half a second after the drop friction is compensated.
             for rupture in &data.ruptures {
                 let at = (200.0 * (rupture.time_s + drop_s + 0.5)) as usize;
@@ -49,6 +54,17 @@ fn a_drop_that_takes_up_to_a_tenth_of_a_second_is_one_rupture() {
             }
         }
     }
+}
+
+#[test]
+fn friction_that_a_stop_takes_away_is_no_part_of_the_drop() {
+    let rupture = soft(1, 0.0).ruptures[0];
+    let velocity = |t: f64| if t < rupture.time_s + 0.05 { 0.0023 } else { 0.0 };
+    let data = insertion(&gels(), -0.005, rupture.time_s + 1.0, 200.0, 0.02, 1, velocity);
+    let outputs = enhance(&stylet(), &data.samples);
+    let whole: Vec<CompletedDrop> = outputs.iter().filter_map(|o| o.completed_drop).collect();
+    assert_eq!(whole.len(), 1, "{whole:?}");
+    assert!((whole[0].drop_n - rupture.released_n).abs() < 4.0 * 0.02, "{whole:?} for {rupture:?}");
 }
 
 #[test]
