@@ -8,6 +8,7 @@ mod baseline;
 mod baseline_fit;
 mod completed_drop;
 mod contact_detection;
+mod continued_drop;
 mod cusum;
 mod force_predictor;
 mod free_tip;

@@ -1,6 +1,6 @@
 //! Rupture detection: tracks force drops, tests them against noise and texture, and updates all filters at a rupture.
 
-use super::completed_drop::ContinuedDrop;
+use super::continued_drop::{ContinuedDrop, LIKELY_DROP_SDS};
 use super::force_predictor::{MEMORY_M, MotionStep};
 use super::motion::SPEED_TIME_CONSTANT_S;
 use super::state::{
@@ -12,8 +12,6 @@ use crate::sample::{Cause, Detection, Sample};
 
 /// Samples that the level of a candidate is averaged over at most.
 const MAX_AVERAGED_SAMPLES: f64 = 16.0;
-/// Size of a drop in standard deviations where the base law is rejected: outside its 95 % interval.
-pub(super) const LIKELY_DROP_SDS: f64 = 2.0;
 /// Smallest drop before the base law is confirmed, as a share of the largest force: the elastic share of the prior at contact.
 const UNCONFIRMED_DROP_SHARE: f64 = 0.5;
 /// Squared distance in variances within which two estimates of a drop's onset agree.

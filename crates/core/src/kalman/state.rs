@@ -1,7 +1,7 @@
 //! State of the algorithm between samples.
 
 use super::baseline::AirBaseline;
-use super::completed_drop::ContinuedDrop;
+use super::continued_drop::ContinuedDrop;
 use super::cusum::CusumBank;
 use super::force_predictor::ForcePredictor;
 use super::free_tip::FreeTipDetector;
