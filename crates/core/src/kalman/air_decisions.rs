@@ -103,7 +103,7 @@ impl KalmanEnhancer {
         }
         self.start_contact(config, step, sample, sample.position_m, rise, rise + 3.0 * sd);
         let unknown =
-            if moving { Some(fit) } else { self.baseline.history.doubtful_constant(evidence, sample) };
+            if moving { Some(fit) } else { self.baseline.history.doubtful_constant(fit, evidence, sample) };
         if let Some(fit) = unknown {
             self.set_estimator_baseline(&fit);
         }

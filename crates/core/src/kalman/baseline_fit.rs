@@ -67,13 +67,17 @@ impl AirHistory {
         BaselineFit { kind: if sure { fit.kind } else { BaselineKind::Constant }, ..fit }
     }
 
-    /// The constant baseline before a bend, with the covariance of its mixture with a moving one; `None` if that is improbable.
-    pub(super) fn doubtful_constant(&self, evidence: &AirEvidence, at: &Sample) -> Option<BaselineFit> {
+    /// A constant baseline fitted before a bend, with the covariance of its mixture with a moving one; `None` if that is improbable.
+    pub(super) fn doubtful_constant(
+        &self,
+        mut constant: BaselineFit,
+        evidence: &AirEvidence,
+        at: &Sample,
+    ) -> Option<BaselineFit> {
         let probability = evidence.moving_probability();
         if probability < MIN_MOVING_PROBABILITY {
             return None;
         }
-        let mut constant = self.fit_before_bend(evidence, at);
         let bend = &evidence.moving_bend;
         let moving = self.fit(evidence, &evidence.total.before(&bend.sums), bend.form, at);
         let apart = [moving.x[0] - constant.x[0], moving.x[1], moving.x[2]];

@@ -1,24 +1,32 @@
-//! State of a drop that may continue after the declaration of its rupture.
+//! The fall of the force after the declaration of a rupture: tissue that tears takes up to 0.1 s to release the force.
 
-/// Size of a drop in standard deviations where the base law is rejected: outside its 95 % interval.
+use crate::sample::CompletedDrop;
+
+/// Size in standard deviations, outside the 95 % interval, of a drop where the base law is rejected, and of a further fall.
 pub(super) const LIKELY_DROP_SDS: f64 = 2.0;
 
 /// The drop of the last rupture while it may continue.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ContinuedDrop {
     /// Fall so far in N, and the variance of its part until the declaration in N².
-    pub(super) drop_n: f64,
-    pub(super) variance_n2: f64,
+    drop_n: f64,
+    variance_n2: f64,
     /// Mean force in N of the samples since it last fell, and their number; at the declaration that of the fallen samples.
     pub(super) level_n: f64,
-    pub(super) count: f64,
+    count: f64,
     /// The force has fallen further since the declaration.
-    pub(super) has_fallen: bool,
+    has_fallen: bool,
 }
 
 impl ContinuedDrop {
     pub(super) fn new(drop_n: f64, sd_n: f64, level_n: f64) -> Self {
         Self { drop_n, variance_n2: sd_n * sd_n, level_n, count: 1.0, has_fallen: false }
+    }
+
+    /// The drop of a layer, with noise of variance `noise_n2` on the samples behind it.
+    pub(super) fn completed(&self, layer: usize, noise_n2: f64) -> CompletedDrop {
+        let level_n2 = if self.has_fallen { noise_n2 / self.count } else { 0.0 };
+        CompletedDrop { layer, drop_n: self.drop_n, drop_sd_n: libm::sqrt(self.variance_n2 + level_n2) }
     }
 
     /// Takes a sample with noise of variance `noise_n2`, of which so many are averaged.

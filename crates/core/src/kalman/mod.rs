@@ -6,7 +6,6 @@ mod air_history;
 mod air_sums;
 mod baseline;
 mod baseline_fit;
-mod completed_drop;
 mod contact_detection;
 mod continued_drop;
 mod cusum;

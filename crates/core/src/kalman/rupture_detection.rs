@@ -189,6 +189,26 @@ impl KalmanEnhancer {
         });
     }
 
+    /// Reports the whole drop of the last rupture when its time is over.
+    pub(super) fn complete_drop(&mut self) {
+        if self.time_since_rupture_s > MAX_DROP_DURATION_S
+            && let Some(drop) = self.continued_drop.take()
+        {
+            let noise_n2 = self.noise.marginal_variance();
+            self.output.completed_drop = Some(drop.completed(self.output.ruptures, noise_n2));
+        }
+    }
+
+    /// Adds what the force has fallen further, beyond noise and apart from friction that a lower speed takes away.
+    pub(super) fn follow_drop(&mut self, step: &MotionStep, sample: &Sample) {
+        let Some(mut drop) = self.continued_drop.filter(|_| self.stop.is_none()) else { return };
+        if self.misfit_weight == 0.0 {
+            drop.level_n += self.snapshot.friction(sample.position_m) * step.dv_mps;
+        }
+        drop.push(sample.force_n, self.noise.marginal_variance(), self.averaged_samples());
+        self.continued_drop = Some(drop);
+    }
+
     /// True while the force is still falling after a rupture. At the end of a long drop the rupture's position is revised.
     pub(super) fn drop_is_ongoing(&mut self, step: &MotionStep, sample: &Sample) -> bool {
         // Acceleration from the lag of the low-passed speed.

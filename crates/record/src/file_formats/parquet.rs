@@ -45,8 +45,12 @@ fn damaged(why: impl std::fmt::Display) -> String {
 
 /// Rejects a dictionary, the first page of a column, with more values than bytes: the library allocates them before it reads them.
 fn check_dictionary(group: &dyn RowGroupReader, column: usize) -> Result<(), String> {
-    let first = group.get_column_page_reader(column).map_err(damaged)?.next();
-    match first.transpose().map_err(damaged)? {
+    let mut pages = group.get_column_page_reader(column).map_err(damaged)?;
+    // Other pages are decompressed only once, to be read.
+    if !pages.peek_next_page().map_err(damaged)?.is_some_and(|page| page.is_dict) {
+        return Ok(());
+    }
+    match pages.get_next_page().map_err(damaged)? {
         Some(Page::DictionaryPage { buf, num_values, .. }) if num_values as usize > buf.len() => {
             Err(damaged(format!("a dictionary of {num_values} values in {} bytes", buf.len())))
         }
