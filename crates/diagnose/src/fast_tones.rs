@@ -94,6 +94,19 @@ fn median_step_s(r: &Recording) -> f64 {
     median_of(r.time_s.windows(2).map(|w| w[1] - w[0])).max(1e-9)
 }
 
+/// Fit of a sinusoid in a range of samples.
+struct Sinusoid {
+    /// Coefficient of the sine (N).
+    sine: f64,
+    /// Coefficient of the cosine (N).
+    cosine: f64,
+    /// Explained sum of squares (N²): about half the squared amplitude per sample. Close to half the sampling rate, one column is nearly zero,
+    /// and its coefficient says nothing about the power.
+    explained: f64,
+    /// Number of samples used.
+    samples: f64,
+}
+
 impl<'a> Samples<'a> {
     fn new(r: &'a Recording, exclude: &[bool], length: usize) -> Self {
         let n = r.len();
@@ -135,8 +148,8 @@ impl<'a> Samples<'a> {
         1.0 - kept
     }
 
-    /// Coefficients of sine and cosine over a range of samples, and the number of samples used.
-    fn sinusoid(&self, hz: f64, range: std::ops::Range<usize>) -> ([f64; 2], f64) {
+    /// Least-squares fit of a sinusoid over a range of samples, corrected for the subtracted moving average.
+    fn sinusoid(&self, hz: f64, range: std::ops::Range<usize>) -> Sinusoid {
         let (mut ss, mut sc, mut cc, mut s, mut c, mut n) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for k in range.filter(|k| self.used[*k]) {
             let (a, b) = libm::sincos(TAU * hz * self.time_s[k]);
@@ -147,10 +160,13 @@ impl<'a> Samples<'a> {
         let ridge = 1e-3 * n;
         let det = (ss + ridge) * (cc + ridge) - sc * sc;
         if det <= 0.0 {
-            return ([0.0; 2], n);
+            return Sinusoid { sine: 0.0, cosine: 0.0, explained: 0.0, samples: n };
         }
-        let share = (1.0 + 2.0 * ridge / f64::max(n, 1.0)) / self.response(hz);
-        ([share * ((cc + ridge) * s - sc * c) / det, share * ((ss + ridge) * c - sc * s) / det], n)
+        let response = self.response(hz);
+        let share = (1.0 + 2.0 * ridge / f64::max(n, 1.0)) / response;
+        let sine = share * ((cc + ridge) * s - sc * c) / det;
+        let cosine = share * ((ss + ridge) * c - sc * s) / det;
+        Sinusoid { sine, cosine, explained: (sine * s + cosine * c) / response, samples: n }
     }
 
     /// Ranges of samples of about one second.
@@ -169,13 +185,9 @@ impl<'a> Samples<'a> {
     }
 }
 
-/// Power of all recordings at one frequency, each with its own phase, weighted by their samples.
+/// Sum of squares (N²) that one frequency explains in all recordings, each with its own phase.
 fn power(samples: &[Samples], hz: f64) -> f64 {
-    let of = |s: &Samples| {
-        let ([a, b], n) = s.sinusoid(hz, 0..s.fast_n.len());
-        (a * a + b * b) * n
-    };
-    samples.par_iter().map(of).into_iter().sum()
+    samples.par_iter().map(|s| s.sinusoid(hz, 0..s.fast_n.len()).explained).into_iter().sum()
 }
 
 /// The strongest significant tone from `lowest_hz` on, and its force (N) in every recording.
@@ -254,8 +266,8 @@ fn fitted(samples: &[Samples], hz: f64, variance: f64) -> (FastTone, Vec<Vec<f64
         let mut wave = vec![0.0; s.fast_n.len()];
         let mut before: Option<[f64; 2]> = None;
         for range in s.windows() {
-            let ([a, b], n) = s.sinusoid(hz, range.clone());
-            window_power += (a * a + b * b) * n;
+            let Sinusoid { sine: a, cosine: b, explained, .. } = s.sinusoid(hz, range.clone());
+            window_power += explained;
             windows += 1.0;
             if let Some([p, q]) = before.replace([a, b]) {
                 let turned = libm::atan2(b * p - a * q, a * p + b * q);
@@ -267,15 +279,14 @@ fn fitted(samples: &[Samples], hz: f64, variance: f64) -> (FastTone, Vec<Vec<f64
             }
         }
         waves.push(wave);
-        let ([a, b], n) = s.sinusoid(hz, 0..s.fast_n.len());
-        let square = a * a + b * b;
-        (stable_power, all) = (stable_power + square * n, all + n);
+        let Sinusoid { sine, cosine, explained, samples: n } = s.sinusoid(hz, 0..s.fast_n.len());
+        (stable_power, all) = (stable_power + explained, all + n);
         (information, mid) = (information + n, mid + n * s.mid_s());
         frequency_information += n * s.duration_s().powi(2);
-        phases.push((libm::atan2(b, a), (2.0 * variance / (square * n).max(f64::MIN_POSITIVE)).sqrt()));
+        phases.push((libm::atan2(cosine, sine), (variance / explained.max(f64::MIN_POSITIVE)).sqrt()));
     }
     let recordings = samples.len() as f64;
-    let (window_nats, stable_nats) = (0.25 * window_power / variance, 0.25 * stable_power / variance);
+    let (window_nats, stable_nats) = (0.5 * window_power / variance, 0.5 * stable_power / variance);
     let count = all.max(2.0) as usize;
     let penalty = |of: f64| bic_penalty((2.0 * of) as usize + 1, count);
     let gain_nats = (window_nats - penalty(windows)).max(stable_nats - penalty(recordings));

@@ -68,6 +68,19 @@ fn amplitude_frequency_and_phase_lie_within_their_deviations() {
     }
 }
 
+/// Near half the sampling rate, one of both columns is nearly zero and its coefficient is large.
+#[test]
+fn no_frequency_explains_more_than_the_sum_of_squares() {
+    let all = recordings(1, 200.0, |_, _| 0.0);
+    let samples = Samples::new(&all[0], &[], 9);
+    let present: f64 = samples.fast_n.iter().map(|f| f * f).sum();
+    for k in 0..2000 {
+        let hz = 99.9 + 0.1 * k as f64 / 2000.0;
+        let explained = power(core::slice::from_ref(&samples), hz) * samples.response(hz).powi(2);
+        assert!((0.0..0.01 * present).contains(&explained), "{hz} Hz: {explained} of {present}");
+    }
+}
+
 #[test]
 fn noise_ruptures_and_slow_tones_are_no_fast_tones() {
     for count in [1, 4] {
