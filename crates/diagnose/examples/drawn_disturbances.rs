@@ -159,6 +159,9 @@ fn cyclic_case(hysteresis: bool, seed: u64, index: u64) -> Result<Drawn, Box<dyn
     let mut between = |low: f64, high: f64| low + (high - low) * rng.random::<f64>();
     let hz = libm::exp(between(libm::log(0.05), 0.0));
     let seconds = (between(3.0, 8.0) / hz).clamp(10.0, 60.0);
+    if std::env::var_os("STYLET_SHOW").is_some() {
+        println!("  case {index}: {hz:.4} Hz for {seconds:.1} s");
+    }
     let (amplitude_m, triangle) = (between(0.003, 0.009), between(0.0, 1.0) < 0.5);
     let stiffness = between(35.0, 130.0);
     let (loss_n, travel_m) = (between(0.05, 0.3), libm::exp(between(libm::log(1e-4), libm::log(2e-3))));

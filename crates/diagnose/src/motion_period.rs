@@ -69,7 +69,8 @@ fn length_s(b: &BlockAverages) -> f64 {
 fn is_multiple_of_motion(hz: f64, b: &BlockAverages) -> bool {
     motion_period_s(b).is_some_and(|period_s| {
         let (order, resolution) = (hz * period_s, period_s / length_s(b));
-        let harmonic = order.round().clamp(1.0, MAX_HARMONIC);
+        // Order 0: less than one period in the recording.
+        let harmonic = order.round().clamp(0.0, MAX_HARMONIC);
         (order - harmonic).abs() <= resolution
             || (2..=MAX_SUBHARMONIC).any(|m| (order - 1.0 / f64::from(m)).abs() <= resolution)
     })
@@ -155,7 +156,7 @@ mod tests {
     #[test]
     fn harmonics_and_low_subharmonics_within_the_resolution_are_multiples() {
         let b = blocks(triangle(4.0), 40.0);
-        for hz in [0.25, 0.5, 0.26, 0.125, 5.0] {
+        for hz in [0.25, 0.5, 0.26, 0.125, 5.0, 0.02] {
             assert!(is_multiple_of_motion(hz, &b), "{hz} Hz");
         }
         for hz in [0.33, 0.625, 5.38] {
