@@ -59,7 +59,7 @@ impl EffectSearch {
             return from_base;
         }
         progress("fitting the sensor's baseline");
-        match Baseline::fit(prepared, &base, &data, false) {
+        match Baseline::fit(prepared, &base, &data, true) {
             None => from_base,
             Some(baseline) => from_base.or_better(one_more(Self::from_baseline(baseline, base), progress)),
         }
@@ -72,7 +72,7 @@ impl EffectSearch {
         if let Some((base, data)) = self.base.clone()
             && !self.search.leaves_noise(&self.search.best)
             && !self.prepared.is_search_limit_reached()
-            && let Some(baseline) = Baseline::fit(&self.prepared, &base, &data, true)
+            && let Some(baseline) = Baseline::fit(&self.prepared, &base, &data, false)
         {
             let mut other = Self::from_baseline(baseline, base);
             other.add_further(progress);
@@ -136,9 +136,9 @@ struct Baseline {
 }
 
 impl Baseline {
-    /// Fits the baseline; `None` if its gain is below its penalty. With `exchange`, single force drops are tried as steps instead of
-    /// ruptures and the reverse, which takes many fits; without, the baseline must leave only noise.
-    fn fit(prepared: &PreparedRecordings, base: &Fit, data: &FitData, exchange: bool) -> Option<Self> {
+    /// Fits the baseline; `None` if its gain is below its penalty. If it leaves structure, single force drops are tried as steps instead of
+    /// ruptures and the reverse: one of them if `quick`, and the baseline must then leave only noise.
+    fn fit(prepared: &PreparedRecordings, base: &Fit, data: &FitData, quick: bool) -> Option<Self> {
         let infos: Vec<&'static EffectInfo> =
             base.model.assumed.candidates().filter(|i| i.baseline).collect();
         let candidates = zero_step_candidates(prepared);
@@ -164,8 +164,8 @@ impl Baseline {
         };
         // While structure is left, a drop is tried as a step instead of a rupture, or the reverse.
         let exchanged = |mut best: Fitted| {
-            for _ in 0..MAX_EXCHANGES {
-                if !exchange || leaves_noise(&best.1, &best.2) {
+            for _ in 0..if quick { 1 } else { MAX_EXCHANGES } {
+                if leaves_noise(&best.1, &best.2) {
                     break;
                 }
                 let others: Vec<(f64, Fitted)> = candidates
@@ -184,7 +184,7 @@ impl Baseline {
             best
         };
         let mut best = exchanged(fitted(candidates.steps.clone())?);
-        if exchange && !leaves_noise(&best.1, &best.2) {
+        if !quick && !leaves_noise(&best.1, &best.2) {
             // For many steps at once: all drops that are not assigned to a layer.
             let known = |drop: &&(usize, ZeroStep)| best.0.zero_steps[drop.0].contains(&drop.1);
             let more = unassigned(&candidates.drops, &best.1).filter(|drop| !known(drop));
@@ -205,7 +205,7 @@ impl Baseline {
             best = other;
         }
         let (prepared, fit, data) = best;
-        if !exchange && !leaves_noise(&fit, &data) {
+        if quick && !leaves_noise(&fit, &data) {
             return None;
         }
         let (fit, data) = select_random_effects(fit, data);
