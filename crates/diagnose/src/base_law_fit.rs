@@ -30,6 +30,9 @@ pub fn assumptions_of(s: &Scenario) -> Assumptions {
     }
 }
 
+/// Number of blocks replayed so far, shared by all fits of a diagnosis.
+pub(crate) type ReplayCount = Arc<AtomicU64>;
+
 /// Recordings in blocks, with their detected force drops and steps of the sensor zero.
 #[derive(Clone, Debug)]
 pub struct PreparedRecordings {
@@ -46,7 +49,7 @@ pub struct PreparedRecordings {
     /// Rupture times (s) of the layers in each recording, if they are given instead of assigned.
     pub rupture_times_s: Option<Vec<Vec<f64>>>,
     /// Number of blocks replayed so far, in all fits to these recordings.
-    pub(crate) replayed: Arc<AtomicU64>,
+    pub(crate) replayed: ReplayCount,
     /// Replays of all recordings after which the search for effects ends.
     pub(crate) max_replays: u64,
 }
@@ -124,8 +127,8 @@ pub(crate) const COARSENING_FACTOR: usize = 3;
 /// Largest share of the objective that a coarse refit with random effects may leave for a full refit to follow.
 const MAX_OBJECTIVE_SHARE: f64 = 0.5;
 
-/// Replays of all recordings after which a search for effects ends.
-pub(crate) const MAX_REPLAYS: u64 = 200_000;
+/// Replays of all recordings after which the search for effects ends, with all numbers of layers together.
+pub(crate) const MAX_REPLAYS: u64 = 100_000;
 
 /// Whether a fit leaves only noise: its RMS residual is that of the quiet parts, or what exceeds it is slow noise, which recordings do not
 /// have in common.

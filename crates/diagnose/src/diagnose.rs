@@ -1,6 +1,6 @@
 //! Diagnoses recordings: identifies the effects that the scenario lacks, with intervals and the improvement on held-out recordings.
 
-use crate::base_law_fit::{PreparedRecordings, assumptions_of, fit_base_law};
+use crate::base_law_fit::{PreparedRecordings, ReplayCount, assumptions_of, fit_base_law};
 use crate::check_json::{CheckItem, Light};
 use crate::claims::{self, Context, have_one_motion};
 use crate::competing_effects::{CompetingEffect, find_competing_effects};
@@ -69,11 +69,12 @@ pub struct DiagnosisResult {
 /// Reason why an effect is negligible in the presence of an unmodelled one.
 pub const REASON_IMITATES_UNMODELLED: &str = "may imitate an effect that the library does not contain";
 
-/// Diagnoses recordings with a scenario that has as many layers as the tissue.
+/// Diagnoses recordings with a scenario that has as many layers as the tissue; replays are added to `replayed`.
 pub(crate) fn diagnose_given_layers(
     scenario: &Scenario,
     recordings: &[NamedRecording],
     options: &Options,
+    replayed: &ReplayCount,
     mut progress: impl FnMut(&str),
 ) -> Result<DiagnosisResult, DiagnoseError> {
     let mut check = Vec::new();
@@ -98,7 +99,7 @@ pub(crate) fn diagnose_given_layers(
         notes.extend(outlier);
     }
     progress("fitting the base law");
-    let (prepared, tones) = prepare(scenario, &mut clean, &raw);
+    let (prepared, tones) = prepare(scenario, &mut clean, &raw, replayed);
     let one_motion = have_one_motion(&clean);
     let (mut search, prepared) =
         search_from_any_start(prepared, &clean, &mut progress).ok_or(DiagnoseError::NoFit)?;
@@ -293,23 +294,29 @@ fn prepare(
     scenario: &Scenario,
     clean: &mut [Recording],
     raw: &SensorArtefacts,
+    replayed: &ReplayCount,
 ) -> (PreparedRecordings, Vec<FastTone>) {
     let tones = remove_fast_tones(clean, &raw.exclude, BLOCK_S);
     let assumed = Arc::new(without_removed_tones(assumptions_of(scenario), &tones));
     let blocks: Vec<BlockAverages> =
         clean.par_iter().zip(&raw.exclude).map(|(r, x)| BlockAverages::new(r, x, BLOCK_S)).collect();
     let quantisation_n = raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD;
-    (PreparedRecordings::new(assumed, blocks, quantisation_n), tones)
+    let replayed = Arc::clone(replayed);
+    (PreparedRecordings { replayed, ..PreparedRecordings::new(assumed, blocks, quantisation_n) }, tones)
 }
 
-/// The best model with at most one effect, if it leaves only noise.
+/// The best model with at most one effect, if it leaves only noise; `None` also when the search has reached its limit.
 pub(crate) fn simple_explanation(
     scenario: &Scenario,
     recordings: &[NamedRecording],
+    replayed: &ReplayCount,
     progress: &mut impl FnMut(&str),
 ) -> Option<Fit> {
     let CleanRecordings { mut recordings, raw, .. } = clean_recordings(recordings);
-    let (prepared, _) = prepare(scenario, &mut recordings, &raw);
+    let (prepared, _) = prepare(scenario, &mut recordings, &raw, replayed);
+    if prepared.is_search_limit_reached() {
+        return None;
+    }
     let (base, data) = fit_base_law(&prepared)?;
     let mut found = first_effect(&prepared, base, data, progress);
     found.search.finish(&found.prepared);

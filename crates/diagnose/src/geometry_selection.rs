@@ -2,8 +2,8 @@
 //!
 //! Surface and thicknesses are free at first and are not causes. Where the estimates agree with the prior they are fixed, which saves their
 //! penalty. A position scale changes all thicknesses in proportion, and a shifted boundary changes two neighbours by opposite amounts, so
-//! neither is identifiable with a free geometry; their gain must exceed their penalty compared with the fixed geometry. A boundary shift is
-//! tried only for a thickness outside its tolerance, which has the same penalty: within the tolerances, two wrong thicknesses are no cause.
+//! neither is identifiable with a free geometry; their gain must exceed their penalty compared with the fixed geometry. A thickness outside
+//! its tolerance is penalised like a shifted boundary; within the tolerances, two wrong thicknesses are no cause.
 
 use crate::base_law_fit::{PreparedRecordings, with_updated_times};
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty};
@@ -14,13 +14,11 @@ use stylet_identify::model::{EffectTerm, FreeParameters, Model};
 use stylet_stats::parallel::*;
 use stylet_tissue::{ChainStage, EffectInfo, Proposal};
 
-/// Largest deviation of a thickness from a common scale, relative to the scale.
+/// Largest deviation of the free thicknesses from the pattern of an effect, relative to the size of the pattern.
 const PATTERN_TOLERANCE: f64 = 0.2;
 /// Number of thicknesses that must have a common scale. One always does; two do by chance in one tissue of thirty, which is more frequent
 /// than a wrong position scale.
 const MIN_THICKNESSES: usize = 3;
-/// Smallest position scale that is tried.
-const MIN_SCALE: f64 = 1e-4;
 
 /// Penalty (nats) of the effects and of the free geometry of a model.
 fn penalty_nats(m: &Model, data: &FitData) -> f64 {
@@ -63,12 +61,13 @@ pub fn fix_geometry(search: &mut Search, prepared: &PreparedRecordings) -> bool 
         .filter(|f| (!f.surface || best.model.free.surface) && (!f.thickness || best.model.free.thickness))
         .map(|f| with_fixed_geometry(&best.model, f))
         .collect();
-    if let Some((info, eps)) = position_scale(&best.model, passed_last_boundary(&best.model, &search.data)) {
-        let scaled = with_scaled_coefficients(&best.model, eps);
-        tried.extend(
-            [free(false, false), free(true, false)]
-                .map(|f| with_fixed_geometry(&scaled, f).with_effect(EffectTerm::new(info, &[eps]))),
-        );
+    for choice in geometry_effects(&best.model, passed_last_boundary(&best.model, &search.data)) {
+        for f in [free(false, false), free(true, false)] {
+            tried.push(
+                with_fixed_geometry(&with_scaled_coefficients(&best.model, &choice), f)
+                    .with_effect(choice.clone()),
+            );
+        }
     }
     tried.extend(boundary_shift_models(&best.model));
     let current = penalised_nats(best, &search.data);
@@ -168,29 +167,60 @@ fn passed_last_boundary(model: &Model, data: &FitData) -> bool {
 }
 
 /// Scales stiffness and friction for positions scaled by `1 + eps`; a fit from the unscaled values may not converge.
-fn with_scaled_coefficients(model: &Model, eps: f64) -> Model {
+fn with_scaled_coefficients(model: &Model, choice: &EffectTerm) -> Model {
     let mut m = model.clone();
-    for l in &mut m.tissue.layers {
-        l.stiffness_n_per_m *= 1.0 + eps;
-        l.friction_ns_per_m2 *= (1.0 + eps).powi(2);
+    if choice.info.stage == ChainStage::Position {
+        let scale = 1.0 + choice.values.first().copied().unwrap_or(0.0);
+        for l in &mut m.tissue.layers {
+            l.stiffness_n_per_m *= scale;
+            l.friction_ns_per_m2 *= scale * scale;
+        }
     }
     m
 }
 
-/// Position scale that explains the deviations of the free thicknesses; the last one counts if its boundary was passed.
-fn position_scale(model: &Model, passed_last_boundary: bool) -> Option<(&'static EffectInfo, f64)> {
-    let scales =
-        |i: &&EffectInfo| matches!(i.proposal, Proposal::LinearColumns(_)) && i.stage == ChainStage::Position;
-    let info = model.assumed.candidates().find(scales)?;
-    if model.effects.iter().any(|e| e.info.id == info.id) {
-        return None;
+/// Effects that explain the deviations of the free thicknesses: a shifted boundary only outside the tolerance of a thickness, because two
+/// wrong thicknesses within their tolerances are no cause; a scale of all positions, for which the last thickness counts if its boundary was
+/// passed.
+fn geometry_effects(model: &Model, passed_last_boundary: bool) -> Vec<EffectTerm> {
+    let assumed = &model.assumed.tissue.layers;
+    let deviation_m: Vec<f64> =
+        model.tissue.layers.iter().zip(assumed).map(|(l, b)| l.thickness_m - b.thickness_m).collect();
+    let determined = deviation_m.len().saturating_sub(usize::from(!passed_last_boundary));
+    let tolerated = |l: usize, by: f64| by <= model.assumed.thickness_tolerance[l] * assumed[l].thickness_m;
+    let included = |id: &str| model.effects.iter().any(|e| e.info.id == id);
+    let mut out = Vec::new();
+    for info in model.assumed.candidates().filter(|i| !included(i.id)) {
+        match info.proposal {
+            Proposal::LayerFaces(_) => {
+                for l in 0..deviation_m.len().saturating_sub(1) {
+                    let shift = deviation_m[l];
+                    let others = (0..deviation_m.len()).filter(|k| *k != l && *k != l + 1);
+                    let fits = (deviation_m[l + 1] + shift).abs() < PATTERN_TOLERANCE * shift.abs();
+                    let is_tolerated = tolerated(l, shift.abs()) && tolerated(l + 1, shift.abs());
+                    if fits
+                        && !is_tolerated
+                        && others.into_iter().all(|k| deviation_m[k].abs() < PATTERN_TOLERANCE * shift.abs())
+                    {
+                        out.push(EffectTerm::new(info, &[(l + 1) as f64, shift]));
+                    }
+                }
+            }
+            Proposal::LinearColumns(_) if info.stage == ChainStage::Position => {
+                let ratios: Vec<f64> =
+                    deviation_m.iter().zip(assumed).map(|(o, b)| o / b.thickness_m).collect();
+                let mean = stylet_stats::mean(&ratios[..determined]);
+                if determined >= MIN_THICKNESSES
+                    && mean.abs() > 1e-4
+                    && ratios[..determined].iter().all(|r| (r - mean).abs() < PATTERN_TOLERANCE * mean.abs())
+                {
+                    out.push(EffectTerm::new(info, &[mean]));
+                }
+            }
+            _ => {}
+        }
     }
-    let layers = model.tissue.layers.iter().zip(&model.assumed.tissue.layers);
-    let mut scales: Vec<f64> = layers.map(|(l, assumed)| l.thickness_m / assumed.thickness_m - 1.0).collect();
-    scales.truncate(model.layers().saturating_sub(usize::from(!passed_last_boundary)));
-    let mean = stylet_stats::mean(&scales);
-    let in_proportion = scales.iter().all(|r| (r - mean).abs() < PATTERN_TOLERANCE * mean.abs());
-    (scales.len() >= MIN_THICKNESSES && mean.abs() > MIN_SCALE && in_proportion).then_some((info, mean))
+    out
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Determines the number of layers from the recordings, without a scenario or where they contradict it.
 
+use crate::base_law_fit::ReplayCount;
 use crate::claims;
 use crate::diagnose::{DiagnosisResult, Options, diagnose_given_layers, simple_explanation};
 use crate::diagnosis_json::{Diagnosis, Finding, FindingKind, Verdict};
@@ -27,11 +28,13 @@ pub fn identify(
 ) -> Result<(Scenario, DiagnosisResult), DiagnoseError> {
     progress("looking for layers");
     let scenario = scenario_from_recordings(name, recordings, layers)?;
+    let replayed = ReplayCount::default();
     if layers.is_some() {
-        let result = diagnose_given_layers(&scenario, recordings, options, &mut progress)?;
+        let result = diagnose_given_layers(&scenario, recordings, options, &replayed, &mut progress)?;
         return Ok((scenario, result.with_proposals(options, progress)));
     }
-    let (scenario, result) = diagnose_without_empty_layer(scenario, recordings, options, &mut progress)?;
+    let (scenario, result) =
+        diagnose_without_empty_layer(scenario, recordings, options, &replayed, &mut progress)?;
     Ok((scenario, result.with_proposals(options, progress)))
 }
 
@@ -58,7 +61,8 @@ fn diagnose_with_layers_of_data(
     options: &Options,
     mut progress: &mut impl FnMut(&str),
 ) -> Result<DiagnosisResult, DiagnoseError> {
-    let result = diagnose_given_layers(scenario, recordings, options, &mut progress)?;
+    let replayed = ReplayCount::default();
+    let result = diagnose_given_layers(scenario, recordings, options, &replayed, &mut progress)?;
     let is_contradicted = |d: &Diagnosis| {
         d.verdict == Verdict::Unknown || d.findings.iter().any(|f| claims::contradicts(f.kind))
     };
@@ -66,11 +70,14 @@ fn diagnose_with_layers_of_data(
         return Ok(result);
     }
     progress("looking for another number of layers");
-    let Some(start) = other_layers(scenario, recordings, &mut progress) else { return Ok(result) };
+    let Some(start) = other_layers(scenario, recordings, &replayed, &mut progress) else {
+        return Ok(result);
+    };
     progress("starting again with the layers in the data");
     let (tolerance, thickness_tolerance) = (scenario.tolerance, scenario.thickness_tolerance);
     // If the diagnosis with other layers fails, the first result remains valid.
-    let Ok((start, mut other)) = diagnose_without_empty_layer(start, recordings, options, &mut progress)
+    let Ok((start, mut other)) =
+        diagnose_without_empty_layer(start, recordings, options, &replayed, &mut progress)
     else {
         return Ok(result);
     };
@@ -92,17 +99,18 @@ fn diagnose_with_layers_of_data(
 }
 
 /// The scenario with the layers that the recordings show; `None` if these are as many as assumed, or leave more than noise with a single
-/// effect.
+/// effect, or the search has reached its limit.
 fn other_layers(
     scenario: &Scenario,
     recordings: &[NamedRecording],
+    replayed: &ReplayCount,
     progress: &mut impl FnMut(&str),
 ) -> Option<Scenario> {
     let Scenario { tissue, tolerance, thickness_tolerance, .. } =
         scenario_from_recordings(&scenario.name, recordings, None).ok()?;
     let mut other = Scenario { tissue, tolerance, thickness_tolerance, ..scenario.clone() };
     loop {
-        let fit = simple_explanation(&other, recordings, progress)?;
+        let fit = simple_explanation(&other, recordings, replayed, progress)?;
         let count = other.tissue.layers.len();
         if count == 1 || bears_force(&fit.model.tissue, recordings) {
             return (count != scenario.tissue.layers.len()).then_some(other);
@@ -116,10 +124,11 @@ fn diagnose_without_empty_layer(
     mut scenario: Scenario,
     recordings: &[NamedRecording],
     options: &Options,
+    replayed: &ReplayCount,
     progress: &mut impl FnMut(&str),
 ) -> Result<(Scenario, DiagnosisResult), DiagnoseError> {
     loop {
-        let result = diagnose_given_layers(&scenario, recordings, options, &mut *progress)?;
+        let result = diagnose_given_layers(&scenario, recordings, options, replayed, &mut *progress)?;
         let count = scenario.tissue.layers.len();
         if count == 1 || bears_force(&result.search.best.model.tissue, recordings) {
             return Ok((scenario, result));

@@ -57,6 +57,7 @@ mod model_pruning;
 mod motion_period;
 pub mod negligible_effects;
 mod outlier_segment_test;
+mod parameter_json;
 mod parameter_labels;
 mod parameters_by_recording;
 mod partial_model;
