@@ -184,13 +184,13 @@ fn out_of(scratch: &Scratch) -> PathBuf {
 }
 
 #[test]
-fn run_and_sweep_survive_every_fault_at_every_third_call() {
+fn run_and_sweep_survive_every_fault_at_every_seventh_call() {
     let scratch = Scratch::in_memory("faults");
     let Some(shim) = shim(scratch.path()) else { return };
     let cases = cases(&scratch);
-    let run = every_fault(&shim, &cases[0], &out_of(&scratch), "kateEnNs", 3);
-    let sweep = every_fault(&shim, &cases[1], &out_of(&scratch), "kes", 31);
-    assert!(run > 150 && sweep > 20, "{run} and {sweep} faults");
+    let run = every_fault(&shim, &cases[0], &out_of(&scratch), "kateEnNs", 7);
+    let sweep = every_fault(&shim, &cases[1], &out_of(&scratch), "kes", 61);
+    assert!(run > 60 && sweep > 8, "{run} and {sweep} faults");
 }
 
 #[test]
