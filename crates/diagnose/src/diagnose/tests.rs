@@ -1,6 +1,6 @@
 use super::*;
 use crate::diagnosis_json::{Cause, Diagnosis, Verdict};
-use crate::test_fixtures::{search_result, search_stage};
+use crate::test_fixtures::{search_result, search_stage, uniform_sequence};
 use stylet_identify::model::FreeParameters;
 use stylet_identify::noise::Noise;
 use stylet_record::sensor_artefacts::SensorArtefacts;
@@ -86,4 +86,23 @@ fn extended_scenario_has_the_causes_and_the_parameters_of_their_model() {
     search.best.model.effects.clear();
     assert_eq!(of(&search, Verdict::None, vec![]), (best, vec![]));
     assert_eq!(of(&search, Verdict::Unknown, vec![]), (base, vec![]));
+}
+
+/// All searches of a diagnosis share one limit.
+#[test]
+fn no_other_number_of_layers_is_tried_beyond_the_limit_of_replays() {
+    let layer = "(thickness_m: 0.1, stiffness_n_per_m: 80.0, friction_ns_per_m2: 9000.0)";
+    let text = format!("Scenario(name: \"a\", motion: Recorded, tissue: (layers: [{layer}]))");
+    let scenario = Scenario::parse("a.ron", &text).expect("a scenario");
+    let t: Vec<f64> = (0..2000).map(|k| f64::from(k) / 200.0).collect();
+    let z: Vec<f64> = t.iter().map(|t| 2e-3 * t).collect();
+    let mut uniform = uniform_sequence(3);
+    let force = z.iter().map(|z| 80.0 * z + 9000.0 * z * 2e-3 + 0.01 * (uniform() - 0.5)).collect();
+    let recording = Recording::new(t, z, force).expect("clean columns");
+    let recordings = [NamedRecording { name: "a.csv".to_owned(), recording, notes: Vec::new() }];
+    let is_explained = |replayed: u64| {
+        let replayed = ReplayCount::new(replayed.into());
+        simple_explanation(&scenario, &recordings, &replayed, &mut |_| {}).is_some()
+    };
+    assert!(is_explained(0) && !is_explained(u64::MAX / 2));
 }
