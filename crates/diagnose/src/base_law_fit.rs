@@ -165,48 +165,20 @@ pub(crate) fn roughness(blocks: &[BlockAverages]) -> f64 {
 /// Whether each recording has its own surface position and its own friction factor.
 pub(crate) type RandomEffects = (bool, bool);
 
-/// Random effects that are free in a model.
-pub(crate) fn random_effects_of(model: &Model) -> RandomEffects {
-    (model.free.recording_surface, model.free.recording_friction)
-}
-
 /// Fits the base law from the prior; returns the fit and the data with the noise estimated from it. `None` when the model cannot be
 /// replayed.
 #[must_use]
 pub fn fit_base_law(prepared: &PreparedRecordings) -> Option<(Fit, FitData)> {
-    fit_from_prior(prepared, &[], (false, false))
+    fit_from_prior(prepared, &[])
 }
 
-/// Fits a model with effects from the prior, so that this model determines which drops belong to layers.
-///
-/// The base law mistakes drops that an effect produces for ruptures and shifts its layers; a fit that starts from there stays in that local
-/// minimum.
-#[must_use]
-pub fn refit_from_prior(
-    prepared: &PreparedRecordings,
-    effects: &[EffectTerm],
-    random_effects: RandomEffects,
-    data: &FitData,
-) -> Option<Fit> {
-    let (found, _) = fit_from_prior(prepared, effects, random_effects)?;
-    fit(&with_updated_times(found.model, data, &prepared.drop_times()), data, Effort::FULL)
-}
-
-/// As [`refit_from_prior`], on coarser blocks (`coarse`) and with fewer steps, to decide whether a full refit can help.
-#[must_use]
-pub fn coarse_refit(
-    prepared: &PreparedRecordings,
-    effects: &[EffectTerm],
-    random_effects: RandomEffects,
-    coarse: &FitData,
-) -> Option<Fit> {
+/// Fits the base law with random effects from the prior on coarser blocks (`coarse`) and with fewer steps, to decide whether a full refit can
+/// help.
+fn coarse_refit(prepared: &PreparedRecordings, coarse: &FitData) -> Option<Fit> {
     let averaged = PreparedRecordings { blocks: Arc::clone(&coarse.recordings), ..prepared.clone() };
-    let (found, _) = fit_with_assigned_drops(&averaged, effects, random_effects)?;
-    let mut model = found.model;
-    if random_effects != (false, false) {
-        // Rupture times would otherwise be shifted to compensate for the missing random effects.
-        model = fit(&model, coarse, COARSE_EFFORT)?.model;
-    }
+    let (found, _) = fit_with_assigned_drops(&averaged, &[], (true, true))?;
+    // Rupture times would otherwise be shifted to compensate for the missing random effects.
+    let model = fit(&found.model, coarse, COARSE_EFFORT)?.model;
     fit(&with_updated_times(model, coarse, &prepared.drop_times()), coarse, COARSE_EFFORT)
 }
 
@@ -215,7 +187,7 @@ pub(crate) fn fit_with_baseline(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
 ) -> Option<(Fit, FitData)> {
-    fit_from_prior(prepared, effects, (false, false))
+    fit_from_prior(prepared, effects)
 }
 
 /// Refits the base law with a surface position and a friction factor per recording. The refit is kept if it reduces the objective so
@@ -235,7 +207,7 @@ pub fn refit_with_random_effects(
             .with_recordings(data.recordings.par_iter().map(|b| b.coarsened(COARSENING_FACTOR)).collect());
         let coarse = with_noise_of(&base_fit.model, &coarse)?;
         let current = residuals(&base_fit.model, &coarse)?.nats;
-        let coarse_fit = coarse_refit(prepared, &[], (true, true), &coarse)?;
+        let coarse_fit = coarse_refit(prepared, &coarse)?;
         if coarse_fit.nats() > MAX_OBJECTIVE_SHARE * current {
             return None;
         }
@@ -285,21 +257,13 @@ fn fit_with_assigned_drops(
 }
 
 /// Fit from the prior: assigned drops, then rounds in which noise, rupture times and parameters are updated.
-fn fit_from_prior(
-    prepared: &PreparedRecordings,
-    effects: &[EffectTerm],
-    random_effects: RandomEffects,
-) -> Option<(Fit, FitData)> {
-    let (mut best, mut data) = fit_with_assigned_drops(prepared, effects, random_effects)?;
+fn fit_from_prior(prepared: &PreparedRecordings, effects: &[EffectTerm]) -> Option<(Fit, FitData)> {
+    let (mut best, mut data) = fit_with_assigned_drops(prepared, effects, (false, false))?;
     let times = prepared.drop_times();
     for round in 0..3 {
         data = data.with_estimated_noise(&best.residuals.residual_n, NoiseSource::Detrended);
-        let mut model = best.model.clone();
-        if round == 0 && random_effects != (false, false) {
-            model = fit(&model, &data, COARSE_EFFORT)?.model;
-        }
         let effort = if round == 2 { Effort::FULL } else { COARSE_EFFORT };
-        best = fit(&with_updated_times(model, &data, &times), &data, effort)?;
+        best = fit(&with_updated_times(best.model, &data, &times), &data, effort)?;
     }
     data = data.with_estimated_noise(&best.residuals.residual_n, NoiseSource::Detrended);
     best = fit_from_zero_scatter(&best.model, &data, Effort::FULL)?;

@@ -31,8 +31,6 @@ const MIN_FIRST_ORDER_SHARE: f64 = 0.5;
 const STOP_DISTANCE_NATS: f64 = 100.0;
 /// Largest number of restarts of the current model from a candidate's parameters.
 const MAX_RESTARTS: usize = 4;
-/// Selection steps in which candidates may be refitted from the prior.
-const MAX_PRIOR_STAGES: usize = 2;
 
 /// A short fit on coarse blocks with at most one effect, to compare start values of the layers.
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +60,7 @@ impl Search {
 
     /// A selection before its first step, from a fit that may already have effects.
     pub(crate) fn start(fit: Fit, data: FitData) -> Self {
-        Self { restarts: MAX_RESTARTS, prior_refits: MAX_PRIOR_STAGES, ..Self::from_fit(fit, data) }
+        Self { restarts: MAX_RESTARTS, ..Self::from_fit(fit, data) }
     }
 
     /// Adds effects until none gains enough, or the model has `max_effects` of them.
@@ -117,10 +115,6 @@ impl Search {
         let mut full = self.fit_candidates(&ranked, &coarse, &times);
         if let Some(moved) = full.first().and_then(|f| self.with_boundary_moved(f, &coarse, &times)) {
             full[0] = moved;
-        }
-        if let Some(more) = self.refit_candidates_from_prior(&full, &ranked, &coarse, prepared) {
-            full.extend(more);
-            self.rank(&mut full);
         }
         full.retain(|f| !has_confounded_clock(f, &self.data));
         if self.restart_from_leader(&full) {

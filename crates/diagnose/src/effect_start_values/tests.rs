@@ -314,35 +314,6 @@ fn breaks_are_tried_at_unassigned_drops_and_on_a_grid() {
 }
 
 #[test]
-fn breaks_are_tried_at_drops_common_to_all_recordings() {
-    let f = fitted_without(&[]);
-    let surface_m = f.fit.model.assumed.tissue.surface_m;
-    let drop = |(depth_m, size_n): (f64, f64)| ForceDrop {
-        time_s: 1.0,
-        position_m: surface_m + depth_m,
-        size_n,
-        score: 9.0,
-    };
-    let mut prepared = PreparedRecordings::new(f.fit.model.assumed.clone(), f.data.recordings.to_vec(), 0.0);
-    let starts = |prepared: &PreparedRecordings| {
-        let at = |c: &EffectTerm| (c.values[0] + c.values[2] / c.values[1], c.values[2]);
-        super::starts_at_common_drops(info("hidden_membrane"), prepared).iter().map(at).collect::<Vec<_>>()
-    };
-    // One place within three millimetres, another one missing in a recording.
-    prepared.drops = [[(5e-3, 0.2), (12e-3, 0.9)], [(6e-3, 0.3), (20e-3, 0.9)], [(7e-3, 0.4), (12e-3, 0.9)]]
-        .map(|of| of.map(drop).to_vec())
-        .to_vec();
-    let found = starts(&prepared);
-    // Only stretches of 0.8 and 3 mm are shorter than the depth.
-    assert_eq!(found.len(), 2);
-    for (depth_m, size_n) in found {
-        assert!((depth_m - 6e-3).abs() < 1e-9 && (size_n - 0.3).abs() < 1e-9, "{depth_m} {size_n}");
-    }
-    prepared.drops[1].clear();
-    assert_eq!(starts(&prepared), []);
-}
-
-#[test]
 fn breaking_elements_lie_within_the_travelled_tissue() {
     let whole = HiddenMembrane { depth_m: 5e-3, stiffness_n_per_m: 120.0, puncture_n: 9.0 };
     let at_surface = HiddenMembrane { depth_m: 0.0, stiffness_n_per_m: 120.0, puncture_n: 0.36 };
