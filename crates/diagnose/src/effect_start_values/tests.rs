@@ -4,6 +4,7 @@ use crate::test_fixtures::{
     assumed_layers, blocks_of, data_of, fit_from_truth, fit_simulated, recordings_with_added_force,
 };
 use stylet_identify::fit::Fit;
+use stylet_identify::force_drops::ForceDrop;
 use stylet_identify::likelihood::residuals;
 use stylet_identify::model::Model;
 use stylet_tissue::{

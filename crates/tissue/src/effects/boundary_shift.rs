@@ -30,8 +30,7 @@ static INFO: EffectInfo = EffectInfo {
     id: "boundary_shift",
     equation: "face between layers i and i + 1 moved by delta",
     source: "Imaging and registration errors of a few millimetres",
-    signature: "A rupture at another depth, with the slopes before and after it unchanged. Within the tolerances of both thicknesses it is no \
-                cause.",
+    signature: "A rupture at another depth, with the slopes before and after it unchanged.",
     stage: ChainStage::Geometry,
     parameters: &[
         ParameterInfo { meaning: "layer in front of the face, 1-based", ..LAYER },
