@@ -6,7 +6,8 @@
 //!
 //! `KIND` is `clean`, `offset` (0.05 to 45 N), `drift` (2 to 30 mN/s), `line` (5 to 20 N/m), `steps` (one or two of 0.2 to 5 N), `loaded` (begins inside the
 //! tissue), `cyclic`, `cyclic_hysteresis` or `all`; signs and times are random. `RECORDINGS` of the four drawn motions are diagnosed
-//! together (default 1, a program with ripple and holds). Insertions come from the independent simulator.
+//! together (default 1, a program with ripple and holds). Insertions come from the independent simulator. With `STYLET_SHOW` set, the drawn
+//! steps and cyclic motions are printed.
 
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};

@@ -48,7 +48,7 @@ pub struct PreparedRecordings {
     pub min_noise_sd_n: f64,
     /// Rupture times (s) of the layers in each recording, if they are given instead of assigned.
     pub rupture_times_s: Option<Vec<Vec<f64>>>,
-    /// Number of blocks replayed so far, in all fits to these recordings.
+    /// Number of blocks replayed so far, in all fits of the diagnosis.
     pub(crate) replayed: ReplayCount,
     /// Replays of all recordings after which the search for effects ends.
     pub(crate) max_replays: u64,
@@ -127,7 +127,7 @@ pub(crate) const COARSENING_FACTOR: usize = 3;
 /// Largest share of the objective that a coarse refit with random effects may leave for a full refit to follow.
 const MAX_OBJECTIVE_SHARE: f64 = 0.5;
 
-/// Replays of all recordings after which the search for effects ends, with all numbers of layers together.
+/// Replays of all recordings after which the search for effects ends, summed over all numbers of layers.
 pub(crate) const MAX_REPLAYS: u64 = 100_000;
 
 /// Whether a fit leaves only noise: its RMS residual is that of the quiet parts, or what exceeds it is slow noise, which recordings do not
@@ -162,9 +162,6 @@ pub(crate) fn roughness(blocks: &[BlockAverages]) -> f64 {
     stylet_stats::third_difference_sd(blocks.iter().map(|b| b.force_n.as_slice())).max(1e-6)
 }
 
-/// Whether each recording has its own surface position and its own friction factor.
-pub(crate) type RandomEffects = (bool, bool);
-
 /// Fits the base law from the prior; returns the fit and the data with the noise estimated from it. `None` when the model cannot be
 /// replayed.
 #[must_use]
@@ -176,18 +173,10 @@ pub fn fit_base_law(prepared: &PreparedRecordings) -> Option<(Fit, FitData)> {
 /// help.
 fn coarse_refit(prepared: &PreparedRecordings, coarse: &FitData) -> Option<Fit> {
     let averaged = PreparedRecordings { blocks: Arc::clone(&coarse.recordings), ..prepared.clone() };
-    let (found, _) = fit_with_assigned_drops(&averaged, &[], (true, true))?;
+    let (found, _) = fit_with_assigned_drops(&averaged, &[], true)?;
     // Rupture times would otherwise be shifted to compensate for the missing random effects.
     let model = fit(&found.model, coarse, COARSE_EFFORT)?.model;
     fit(&with_updated_times(model, coarse, &prepared.drop_times()), coarse, COARSE_EFFORT)
-}
-
-/// Fits the base law with baseline effects from the prior; returns the fit and the data with the noise estimated from it.
-pub(crate) fn fit_with_baseline(
-    prepared: &PreparedRecordings,
-    effects: &[EffectTerm],
-) -> Option<(Fit, FitData)> {
-    fit_from_prior(prepared, effects)
 }
 
 /// Refits the base law with a surface position and a friction factor per recording. The refit is kept if it reduces the objective so
@@ -221,11 +210,12 @@ pub fn refit_with_random_effects(
     refitted().unwrap_or((base_fit, data))
 }
 
-/// Assigns drops to layers and fits the parameters, in turn, under a large white noise.
+/// Assigns drops to layers and fits the parameters, in turn, under a large white noise; with `random_effects`, each recording has its own
+/// surface position and friction factor.
 fn fit_with_assigned_drops(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
-    random_effects: RandomEffects,
+    random_effects: bool,
 ) -> Option<(Fit, FitData)> {
     let rough_n = roughness(&prepared.blocks);
     // With a baseline, the range does not contain the offset.
@@ -237,7 +227,7 @@ fn fit_with_assigned_drops(
     let mut start = Model::base(Arc::clone(&prepared.assumed), prepared.blocks.len());
     start.free.wide_thickness = true;
     start.zero_steps.clone_from(&prepared.zero_steps);
-    (start.free.recording_surface, start.free.recording_friction) = random_effects;
+    (start.free.recording_surface, start.free.recording_friction) = (random_effects, random_effects);
     let model = effects.iter().fold(start, |m, choice| m.with_effect(choice.clone()));
     let mut best: Option<Fit> = None;
     for strictness in [1.0, 0.5] {
@@ -256,9 +246,13 @@ fn fit_with_assigned_drops(
     Some((best?, data))
 }
 
-/// Fit from the prior: assigned drops, then rounds in which noise, rupture times and parameters are updated.
-fn fit_from_prior(prepared: &PreparedRecordings, effects: &[EffectTerm]) -> Option<(Fit, FitData)> {
-    let (mut best, mut data) = fit_with_assigned_drops(prepared, effects, (false, false))?;
+/// Fits the base law with baseline effects from the prior: assigned drops, then rounds in which noise, rupture times and parameters are updated.
+/// Returns the fit and the data with the noise estimated from it.
+pub(crate) fn fit_from_prior(
+    prepared: &PreparedRecordings,
+    effects: &[EffectTerm],
+) -> Option<(Fit, FitData)> {
+    let (mut best, mut data) = fit_with_assigned_drops(prepared, effects, false)?;
     let times = prepared.drop_times();
     for round in 0..3 {
         data = data.with_estimated_noise(&best.residuals.residual_n, NoiseSource::Detrended);

@@ -4,7 +4,7 @@
 //! shifts the surface, and a search from there stays in that local minimum. If one effect leaves structure, the search therefore also starts
 //! from the base law with the baseline terms whose gain exceeds their BIC penalty; the better of both searches is kept.
 
-use crate::base_law_fit::{PreparedRecordings, fit_with_baseline, leaves_noise};
+use crate::base_law_fit::{PreparedRecordings, fit_from_prior, leaves_noise};
 use crate::effect_selection::{MAX_EFFECTS, Search, SearchStage};
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use crate::random_effect_selection::select_random_effects;
@@ -55,24 +55,23 @@ impl EffectSearch {
         let search = Search::start(base.clone(), data.clone());
         let from_base = Self { search, prepared: prepared.clone(), base: Some((base.clone(), data.clone())) };
         let from_base = one_more(from_base, progress);
-        if from_base.search.leaves_noise(&from_base.search.best) {
+        if from_base.search.leaves_noise(&from_base.search.best) || prepared.is_search_limit_reached() {
             return from_base;
         }
         progress("fitting the sensor's baseline");
-        match Baseline::fit(prepared, &base, &data, true) {
+        match Baseline::fit(prepared, &base, &data, BaselineEffort::Quick) {
             None => from_base,
             Some(baseline) => from_base.or_better(one_more(Self::from_baseline(baseline, base), progress)),
         }
     }
 
-    /// Searches for further effects. A search without a baseline that leaves structure is compared with one from a baseline that includes
-    /// steps instead of ruptures.
+    /// Searches for further effects. A search without a baseline that leaves structure is compared with one from a baseline with full effort.
     pub(crate) fn complete(mut self, progress: &mut impl FnMut(&str)) -> (Search, PreparedRecordings) {
         self.add_further(progress);
         if let Some((base, data)) = self.base.clone()
             && !self.search.leaves_noise(&self.search.best)
             && !self.prepared.is_search_limit_reached()
-            && let Some(baseline) = Baseline::fit(&self.prepared, &base, &data, false)
+            && let Some(baseline) = Baseline::fit(&self.prepared, &base, &data, BaselineEffort::Full)
         {
             let mut other = Self::from_baseline(baseline, base);
             other.add_further(progress);
@@ -126,6 +125,15 @@ impl EffectSearch {
 /// Recordings with their steps of the zero, fit, and data with the noise of the fit.
 type Fitted = (PreparedRecordings, Fit, FitData);
 
+/// Effort of a fit of the baseline.
+#[derive(Clone, Copy, PartialEq)]
+enum BaselineEffort {
+    /// One force drop is exchanged between rupture and step; the baseline must leave only noise.
+    Quick,
+    /// Up to [`MAX_EXCHANGES`] drops, and all unassigned ones at once.
+    Full,
+}
+
 /// A fit of the base law with a baseline.
 struct Baseline {
     prepared: PreparedRecordings,
@@ -136,9 +144,14 @@ struct Baseline {
 }
 
 impl Baseline {
-    /// Fits the baseline; `None` if its gain is below its penalty. If it leaves structure, single force drops are tried as steps instead of
-    /// ruptures and the reverse: one of them if `quick`, and the baseline must then leave only noise.
-    fn fit(prepared: &PreparedRecordings, base: &Fit, data: &FitData, quick: bool) -> Option<Self> {
+    /// Fits the baseline; `None` if its gain is below its penalty. If it leaves structure, force drops are exchanged between rupture and step,
+    /// one per round.
+    fn fit(
+        prepared: &PreparedRecordings,
+        base: &Fit,
+        data: &FitData,
+        effort: BaselineEffort,
+    ) -> Option<Self> {
         let infos: Vec<&'static EffectInfo> =
             base.model.assumed.candidates().filter(|i| i.baseline).collect();
         let candidates = zero_step_candidates(prepared);
@@ -152,7 +165,7 @@ impl Baseline {
         let terms: Vec<EffectTerm> = infos.iter().map(inactive).collect();
         let fitted = |steps: Vec<Vec<ZeroStep>>| {
             let prepared = prepared.with_zero_steps(steps);
-            let (fit, data) = fit_with_baseline(&prepared, &terms)?;
+            let (fit, data) = fit_from_prior(&prepared, &terms)?;
             Some((prepared, fit, data))
         };
         let gain_of = |other: &(PreparedRecordings, Fit, FitData),
@@ -162,9 +175,13 @@ impl Baseline {
             let penalty = (count(&other.1) - count(&best.1)) * bic_penalty(1, blocks);
             likelihood_gain(&best.1, &other.1, &other.2).value() - penalty
         };
+        let rounds = match effort {
+            BaselineEffort::Quick => 1,
+            BaselineEffort::Full => MAX_EXCHANGES,
+        };
         // While structure is left, a drop is tried as a step instead of a rupture, or the reverse.
         let exchanged = |mut best: Fitted| {
-            for _ in 0..if quick { 1 } else { MAX_EXCHANGES } {
+            for _ in 0..rounds {
                 if leaves_noise(&best.1, &best.2) {
                     break;
                 }
@@ -184,7 +201,7 @@ impl Baseline {
             best
         };
         let mut best = exchanged(fitted(candidates.steps.clone())?);
-        if !quick && !leaves_noise(&best.1, &best.2) {
+        if effort == BaselineEffort::Full && !leaves_noise(&best.1, &best.2) {
             // For many steps at once: all drops that are not assigned to a layer.
             let known = |drop: &&(usize, ZeroStep)| best.0.zero_steps[drop.0].contains(&drop.1);
             let more = unassigned(&candidates.drops, &best.1).filter(|drop| !known(drop));
@@ -205,7 +222,7 @@ impl Baseline {
             best = other;
         }
         let (prepared, fit, data) = best;
-        if quick && !leaves_noise(&fit, &data) {
+        if effort == BaselineEffort::Quick && !leaves_noise(&fit, &data) {
             return None;
         }
         let (fit, data) = select_random_effects(fit, data);

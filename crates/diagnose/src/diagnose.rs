@@ -103,6 +103,7 @@ pub(crate) fn diagnose_given_layers(
     let one_motion = have_one_motion(&clean);
     let (mut search, prepared) =
         search_from_any_start(prepared, &clean, &mut progress).ok_or(DiagnoseError::NoFit)?;
+    let mut is_search_limit_reached = prepared.is_search_limit_reached();
     let mut competing = find_competing_effects(&mut search);
     progress("assessing the residual");
     let mut assessment = assess_search(&mut search, &competing);
@@ -111,7 +112,9 @@ pub(crate) fn diagnose_given_layers(
     let mut unweighted: Vec<(&str, JackknifeResult)> = Vec::new();
     if assessment.unknown && recordings.len() > 1 {
         progress("reweighting for an unmodelled effect");
-        if let Some(mut reweighted) = search.continue_reweighted(&prepared) {
+        let reweighted = search.continue_reweighted(&prepared);
+        is_search_limit_reached |= prepared.is_search_limit_reached();
+        if let Some(mut reweighted) = reweighted {
             let results = jackknife_effects(&search.best, &search.data, sample_noise_sd_n(&search.data));
             unweighted = search.best.model.effects.iter().map(|e| e.info.id).zip(results).collect();
             competing = find_competing_effects(&mut reweighted);
@@ -257,7 +260,7 @@ pub(crate) fn diagnose_given_layers(
         sensor_noise_n: scenario.sensor.force_torque().map(|s| s.noise_n),
         air_noise_n: air_noise_n(scenario, &search.data),
         resolution_n: raw.step_n.unwrap_or(0.0),
-        is_search_limit_reached: prepared.is_search_limit_reached(),
+        is_search_limit_reached,
     };
     claims::compare_with_scenario(&mut diagnosis.base_parameters, scenario);
     claims::apply(&mut diagnosis, &context);
@@ -305,7 +308,7 @@ fn prepare(
     (PreparedRecordings { replayed, ..PreparedRecordings::new(assumed, blocks, quantisation_n) }, tones)
 }
 
-/// The best model with at most one effect, if it leaves only noise; `None` also when the search has reached its limit.
+/// The best model with at most one effect, if it leaves only noise; `None` also when the limit of replays was reached before.
 pub(crate) fn simple_explanation(
     scenario: &Scenario,
     recordings: &[NamedRecording],

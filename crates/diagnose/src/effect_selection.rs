@@ -8,7 +8,6 @@ use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use crate::motion_period::has_confounded_clock;
 use crate::random_effect_selection::select_random_effects;
 use crate::reweighted_fit::fit_reweighted;
-use crate::selection_restarts::{MAX_BEHIND_SHARE, is_new_effect};
 pub use crate::selection_state::{Search, SearchStage};
 use stylet_identify::evidence_nats::Nats;
 use stylet_identify::fit::{Effort, Fit, fit, fit_if_below};
@@ -22,6 +21,8 @@ use stylet_tissue::ChainStage;
 pub const MAX_EFFECTS: usize = 5;
 /// Candidates that get a short fit.
 const SHORT_FITS: usize = 8;
+/// Largest distance of a candidate from the best, as a share of the best gain, for a full fit.
+const MAX_BEHIND_SHARE: f64 = 0.5;
 /// Candidates that get a full fit after the short one.
 const FULL_FITS: usize = 4;
 
@@ -248,6 +249,14 @@ impl Search {
         let mut names: Vec<&str> = Vec::new();
         fits.retain(|f| is_new_effect(&mut names, f));
     }
+}
+
+/// Whether the last effect of a fit is not in `names` yet; adds it.
+fn is_new_effect(names: &mut Vec<&'static str>, f: &Fit) -> bool {
+    let name = f.model.effects.last().map_or("", |e| e.info.id);
+    let new = !names.contains(&name);
+    names.push(name);
+    new
 }
 
 #[cfg(test)]

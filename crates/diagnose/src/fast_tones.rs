@@ -38,7 +38,7 @@ pub(crate) type WithSd = (f64, f64);
 pub(crate) struct FastTone {
     /// Frequency in Hz.
     pub frequency_hz: WithSd,
-    /// Amplitude in N.
+    /// Amplitude in N of a sinusoid with the same mean square.
     pub amplitude_n: WithSd,
     /// Phase at time zero in rad. If recordings differ: that of the first one, with infinite standard deviation.
     pub phase_rad: WithSd,
@@ -104,7 +104,7 @@ struct Sinusoid {
     /// and its coefficient says nothing about the power.
     explained: f64,
     /// Number of samples used.
-    samples: f64,
+    count: f64,
 }
 
 impl<'a> Samples<'a> {
@@ -160,13 +160,13 @@ impl<'a> Samples<'a> {
         let ridge = 1e-3 * n;
         let det = (ss + ridge) * (cc + ridge) - sc * sc;
         if det <= 0.0 {
-            return Sinusoid { sine: 0.0, cosine: 0.0, explained: 0.0, samples: n };
+            return Sinusoid { sine: 0.0, cosine: 0.0, explained: 0.0, count: n };
         }
         let response = self.response(hz);
         let share = (1.0 + 2.0 * ridge / f64::max(n, 1.0)) / response;
         let sine = share * ((cc + ridge) * s - sc * c) / det;
         let cosine = share * ((ss + ridge) * c - sc * s) / det;
-        Sinusoid { sine, cosine, explained: (sine * s + cosine * c) / response, samples: n }
+        Sinusoid { sine, cosine, explained: (sine * s + cosine * c) / response, count: n }
     }
 
     /// Ranges of samples of about one second.
@@ -279,7 +279,7 @@ fn fitted(samples: &[Samples], hz: f64, variance: f64) -> (FastTone, Vec<Vec<f64
             }
         }
         waves.push(wave);
-        let Sinusoid { sine, cosine, explained, samples: n } = s.sinusoid(hz, 0..s.fast_n.len());
+        let Sinusoid { sine, cosine, explained, count: n } = s.sinusoid(hz, 0..s.fast_n.len());
         (stable_power, all) = (stable_power + explained, all + n);
         (information, mid) = (information + n, mid + n * s.mid_s());
         frequency_information += n * s.duration_s().powi(2);

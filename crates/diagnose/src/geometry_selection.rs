@@ -3,7 +3,7 @@
 //! Surface and thicknesses are free at first and are not causes. Where the estimates agree with the prior they are fixed, which saves their
 //! penalty. A position scale changes all thicknesses in proportion, and a shifted boundary changes two neighbours by opposite amounts, so
 //! neither is identifiable with a free geometry; their gain must exceed their penalty compared with the fixed geometry. A thickness outside
-//! its tolerance is penalised like a shifted boundary; within the tolerances, two wrong thicknesses are no cause.
+//! two tolerances is penalised like a shifted boundary; within the tolerances, two wrong thicknesses are no cause.
 
 use crate::base_law_fit::{PreparedRecordings, with_updated_times};
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty};
@@ -186,7 +186,6 @@ fn geometry_effects(model: &Model, passed_last_boundary: bool) -> Vec<EffectTerm
     let assumed = &model.assumed.tissue.layers;
     let deviation_m: Vec<f64> =
         model.tissue.layers.iter().zip(assumed).map(|(l, b)| l.thickness_m - b.thickness_m).collect();
-    let determined = deviation_m.len().saturating_sub(usize::from(!passed_last_boundary));
     let tolerated = |l: usize, by: f64| by <= model.assumed.thickness_tolerance[l] * assumed[l].thickness_m;
     let included = |id: &str| model.effects.iter().any(|e| e.info.id == id);
     let mut out = Vec::new();
@@ -197,7 +196,8 @@ fn geometry_effects(model: &Model, passed_last_boundary: bool) -> Vec<EffectTerm
                     let shift = deviation_m[l];
                     let others = (0..deviation_m.len()).filter(|k| *k != l && *k != l + 1);
                     let fits = (deviation_m[l + 1] + shift).abs() < PATTERN_TOLERANCE * shift.abs();
-                    let is_tolerated = tolerated(l, shift.abs()) && tolerated(l + 1, shift.abs());
+                    let is_tolerated =
+                        tolerated(l, shift.abs()) && tolerated(l + 1, deviation_m[l + 1].abs());
                     if fits
                         && !is_tolerated
                         && others.into_iter().all(|k| deviation_m[k].abs() < PATTERN_TOLERANCE * shift.abs())
@@ -207,6 +207,7 @@ fn geometry_effects(model: &Model, passed_last_boundary: bool) -> Vec<EffectTerm
                 }
             }
             Proposal::LinearColumns(_) if info.stage == ChainStage::Position => {
+                let determined = deviation_m.len().saturating_sub(usize::from(!passed_last_boundary));
                 let ratios: Vec<f64> =
                     deviation_m.iter().zip(assumed).map(|(o, b)| o / b.thickness_m).collect();
                 let mean = stylet_stats::mean(&ratios[..determined]);

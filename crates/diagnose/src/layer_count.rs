@@ -119,7 +119,7 @@ fn other_layers(
     }
 }
 
-/// Diagnoses, and repeats the diagnosis without the last layer as long as that carries no force.
+/// Diagnoses, and repeats the diagnosis without the last layer as long as that carries no force and the search has not reached its limit.
 fn diagnose_without_empty_layer(
     mut scenario: Scenario,
     recordings: &[NamedRecording],
@@ -130,7 +130,8 @@ fn diagnose_without_empty_layer(
     loop {
         let result = diagnose_given_layers(&scenario, recordings, options, replayed, &mut *progress)?;
         let count = scenario.tissue.layers.len();
-        if count == 1 || bears_force(&result.search.best.model.tissue, recordings) {
+        let is_cut_short = result.diagnosis.findings.iter().any(|f| f.kind == FindingKind::SearchLimit);
+        if count == 1 || is_cut_short || bears_force(&result.search.best.model.tissue, recordings) {
             return Ok((scenario, result));
         }
         progress("again without the last layer, which bears no force");

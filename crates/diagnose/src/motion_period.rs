@@ -1,4 +1,4 @@
-//! Period of the commanded motion: at its harmonics, a periodic cause is not distinguishable from a force that depends on the motion.
+//! Period of the commanded motion: at its harmonics, and below one period per recording, a periodic cause is not distinguishable from a force that depends on the motion.
 
 use crate::selection_state::Search;
 use stylet_identify::block_averages::BlockAverages;
@@ -65,7 +65,7 @@ fn length_s(b: &BlockAverages) -> f64 {
     last - first
 }
 
-/// Whether a frequency is, within the resolution of the recording, a harmonic or low subharmonic of its motion.
+/// Whether a frequency is, within the resolution of the recording, zero, a harmonic or a low subharmonic of its motion.
 fn is_multiple_of_motion(hz: f64, b: &BlockAverages) -> bool {
     motion_period_s(b).is_some_and(|period_s| {
         let (order, resolution) = (hz * period_s, period_s / length_s(b));

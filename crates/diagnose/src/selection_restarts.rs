@@ -4,10 +4,9 @@ use crate::model_comparison::MIN_GAIN_NATS;
 use crate::selection_state::Search;
 use stylet_identify::fit::{Effort, Fit, fit_if_below};
 
-/// Largest distance of a candidate from the best, as a share of the best gain, for a full fit.
-pub(crate) const MAX_BEHIND_SHARE: f64 = 0.5;
 /// Smallest gain of a restart as a share of the leading candidate's gain; a marginally better model does not change the selection.
 const MIN_RESTART_SHARE: f64 = 0.1;
+
 impl Search {
     /// Refits the current model from the parameters of the leading candidate, and accepts it if it gains enough; returns whether it did. A
     /// part of the candidate's gain is then due to better start values.
@@ -28,12 +27,4 @@ impl Search {
         }
         true
     }
-}
-
-/// Whether the last effect of a fit is not in `names` yet; adds it.
-pub(crate) fn is_new_effect(names: &mut Vec<&'static str>, f: &Fit) -> bool {
-    let name = f.model.effects.last().map_or("", |e| e.info.id);
-    let new = !names.contains(&name);
-    names.push(name);
-    new
 }

@@ -57,8 +57,6 @@ fn prepared_gel(c_n_per_m: f64) -> (PreparedRecordings, FitData) {
 }
 
 /// No random effects.
-const NO_RANDOM_EFFECTS: (bool, bool) = (false, false);
-
 #[test]
 fn base_law_is_identified_from_the_prior() {
     let (prepared, _) = prepared_gel(0.0);
@@ -104,7 +102,7 @@ fn coarse_refit_uses_the_coarse_blocks_only() {
 #[test]
 fn drops_are_assigned_under_a_wide_noise() {
     let (prepared, _) = prepared_gel(60.0);
-    let (fitted, data) = fit_with_assigned_drops(&prepared, &[], NO_RANDOM_EFFECTS).expect("a fit");
+    let (fitted, data) = fit_with_assigned_drops(&prepared, &[], false).expect("a fit");
     assert!((data.noise.sd_n() / (FIRST_NOISE_SHARE * prepared.largest_force_n()) - 1.0).abs() < 1e-12);
     let rough_n = roughness(&prepared.blocks);
     assert!(rough_n < 0.5 * data.noise.sd_n());

@@ -100,9 +100,13 @@ fn no_other_number_of_layers_is_tried_beyond_the_limit_of_replays() {
     let force = z.iter().map(|z| 80.0 * z + 9000.0 * z * 2e-3 + 0.01 * (uniform() - 0.5)).collect();
     let recording = Recording::new(t, z, force).expect("clean columns");
     let recordings = [NamedRecording { name: "a.csv".to_owned(), recording, notes: Vec::new() }];
-    let is_explained = |replayed: u64| {
-        let replayed = ReplayCount::new(replayed.into());
-        simple_explanation(&scenario, &recordings, &replayed, &mut |_| {}).is_some()
-    };
-    assert!(is_explained(0) && !is_explained(u64::MAX / 2));
+    let replayed = ReplayCount::default();
+    let count = || replayed.load(std::sync::atomic::Ordering::Relaxed);
+    let brief = Options { brief: true, ..Options::default() };
+    diagnose_given_layers(&scenario, &recordings, &brief, &replayed, |_| {}).expect("a diagnosis");
+    let first = count();
+    assert!(first > 0 && simple_explanation(&scenario, &recordings, &replayed, &mut |_| {}).is_some());
+    assert!(count() > first);
+    replayed.store(u64::MAX / 2, std::sync::atomic::Ordering::Relaxed);
+    assert!(simple_explanation(&scenario, &recordings, &replayed, &mut |_| {}).is_none());
 }

@@ -1,7 +1,6 @@
 use super::*;
 use crate::base_law_fit::MAX_REPLAYS;
 use crate::model_pruning::{effect_at_bound, required_gain_nats, strengths_are_determined};
-use crate::repeated_insertions::SegmentedRecording;
 use crate::repeated_insertions::multistart_fit::SetFit;
 use crate::test_fixtures::{
     assumed_layers, blocks_of, data_of, fit_from_truth, fit_simulated, recordings_with_added_force,
@@ -140,13 +139,7 @@ fn search_over(
     fitted: &[AnyEffect],
     more_n: impl Fn(f64) -> f64,
 ) -> (Search, PreparedRecordings) {
-    search_of(
-        &recordings_with_added_force(there, &[[4e-3, 3e-4], [5e-3, -3e-4], [6e-3, 0.0]], more_n),
-        fitted,
-    )
-}
-
-fn search_of(runs: &[SegmentedRecording], fitted: &[AnyEffect]) -> (Search, PreparedRecordings) {
+    let runs = recordings_with_added_force(there, &[[4e-3, 3e-4], [5e-3, -3e-4], [6e-3, 0.0]], more_n);
     let f = fit_from_truth(fitted, &runs.iter().collect::<Vec<_>>());
     let prepared = PreparedRecordings::new(f.fit.model.assumed.clone(), f.data.recordings.to_vec(), 0.0);
     (Search::from_fit(f.fit, f.data), prepared)

@@ -68,9 +68,9 @@ fn amplitude_frequency_and_phase_lie_within_their_deviations() {
     }
 }
 
-/// Near half the sampling rate, one of both columns is nearly zero and its coefficient is large.
+/// Near half the sampling rate, one of the two columns is nearly zero and its coefficient is large.
 #[test]
-fn no_frequency_explains_more_than_the_sum_of_squares() {
+fn noise_has_no_tone_beside_half_the_sampling_rate() {
     let all = recordings(1, 200.0, |_, _| 0.0);
     let samples = Samples::new(&all[0], &[], 9);
     let present: f64 = samples.fast_n.iter().map(|f| f * f).sum();
