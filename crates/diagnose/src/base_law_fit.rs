@@ -162,21 +162,60 @@ pub(crate) fn roughness(blocks: &[BlockAverages]) -> f64 {
     stylet_stats::third_difference_sd(blocks.iter().map(|b| b.force_n.as_slice())).max(1e-6)
 }
 
+/// Whether each recording has its own surface position and its own friction factor.
+pub(crate) type RandomEffects = (bool, bool);
+
+/// Random effects that are free in a model.
+pub(crate) fn random_effects_of(model: &Model) -> RandomEffects {
+    (model.free.recording_surface, model.free.recording_friction)
+}
+
 /// Fits the base law from the prior; returns the fit and the data with the noise estimated from it. `None` when the model cannot be
 /// replayed.
 #[must_use]
 pub fn fit_base_law(prepared: &PreparedRecordings) -> Option<(Fit, FitData)> {
-    fit_from_prior(prepared, &[])
+    fit_from_prior(prepared, &[], (false, false))
 }
 
-/// Fits the base law with random effects from the prior on coarser blocks (`coarse`) and with fewer steps, to decide whether a full refit can
-/// help.
-fn coarse_refit(prepared: &PreparedRecordings, coarse: &FitData) -> Option<Fit> {
+/// Fits a model with effects from the prior, so that this model determines which drops belong to layers.
+///
+/// The base law mistakes drops that an effect produces for ruptures and shifts its layers; a fit that starts from there stays in that local
+/// minimum.
+#[must_use]
+pub fn refit_from_prior(
+    prepared: &PreparedRecordings,
+    effects: &[EffectTerm],
+    random_effects: RandomEffects,
+    data: &FitData,
+) -> Option<Fit> {
+    let (found, _) = fit_from_prior(prepared, effects, random_effects)?;
+    fit(&with_updated_times(found.model, data, &prepared.drop_times()), data, Effort::FULL)
+}
+
+/// As [`refit_from_prior`], on coarser blocks (`coarse`) and with fewer steps, to decide whether a full refit can help.
+#[must_use]
+pub fn coarse_refit(
+    prepared: &PreparedRecordings,
+    effects: &[EffectTerm],
+    random_effects: RandomEffects,
+    coarse: &FitData,
+) -> Option<Fit> {
     let averaged = PreparedRecordings { blocks: Arc::clone(&coarse.recordings), ..prepared.clone() };
-    let (found, _) = fit_with_assigned_drops(&averaged, &[], true)?;
-    // Rupture times would otherwise be shifted to compensate for the missing random effects.
-    let model = fit(&found.model, coarse, COARSE_EFFORT)?.model;
+    let (found, _) = fit_with_assigned_drops(&averaged, effects, random_effects)?;
+    let mut model = found.model;
+    if random_effects != (false, false) {
+        // Rupture times would otherwise be shifted to compensate for the missing random effects.
+        model = fit(&model, coarse, COARSE_EFFORT)?.model;
+    }
     fit(&with_updated_times(model, coarse, &prepared.drop_times()), coarse, COARSE_EFFORT)
+}
+
+/// Fits the base law with baseline effects from the prior; returns the fit and the data with the noise estimated from it.
+pub(crate) fn fit_with_baseline(
+    prepared: &PreparedRecordings,
+    effects: &[EffectTerm],
+) -> Option<(Fit, FitData)> {
+    fit_from_prior(prepared, effects, (false, false))
 }
 
 /// Refits the base law with a surface position and a friction factor per recording. The refit is kept if it reduces the objective so
@@ -196,7 +235,7 @@ pub fn refit_with_random_effects(
             .with_recordings(data.recordings.par_iter().map(|b| b.coarsened(COARSENING_FACTOR)).collect());
         let coarse = with_noise_of(&base_fit.model, &coarse)?;
         let current = residuals(&base_fit.model, &coarse)?.nats;
-        let coarse_fit = coarse_refit(prepared, &coarse)?;
+        let coarse_fit = coarse_refit(prepared, &[], (true, true), &coarse)?;
         if coarse_fit.nats() > MAX_OBJECTIVE_SHARE * current {
             return None;
         }
@@ -210,12 +249,11 @@ pub fn refit_with_random_effects(
     refitted().unwrap_or((base_fit, data))
 }
 
-/// Assigns drops to layers and fits the parameters, in turn, under a large white noise; with `random_effects`, each recording has its own
-/// surface position and friction factor.
+/// Assigns drops to layers and fits the parameters, in turn, under a large white noise.
 fn fit_with_assigned_drops(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
-    random_effects: bool,
+    random_effects: RandomEffects,
 ) -> Option<(Fit, FitData)> {
     let rough_n = roughness(&prepared.blocks);
     // With a baseline, the range does not contain the offset.
@@ -227,7 +265,7 @@ fn fit_with_assigned_drops(
     let mut start = Model::base(Arc::clone(&prepared.assumed), prepared.blocks.len());
     start.free.wide_thickness = true;
     start.zero_steps.clone_from(&prepared.zero_steps);
-    (start.free.recording_surface, start.free.recording_friction) = (random_effects, random_effects);
+    (start.free.recording_surface, start.free.recording_friction) = random_effects;
     let model = effects.iter().fold(start, |m, choice| m.with_effect(choice.clone()));
     let mut best: Option<Fit> = None;
     for strictness in [1.0, 0.5] {
@@ -246,18 +284,22 @@ fn fit_with_assigned_drops(
     Some((best?, data))
 }
 
-/// Fits the base law with baseline effects from the prior: assigned drops, then rounds in which noise, rupture times and parameters are updated.
-/// Returns the fit and the data with the noise estimated from it.
-pub(crate) fn fit_from_prior(
+/// Fit from the prior: assigned drops, then rounds in which noise, rupture times and parameters are updated.
+fn fit_from_prior(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
+    random_effects: RandomEffects,
 ) -> Option<(Fit, FitData)> {
-    let (mut best, mut data) = fit_with_assigned_drops(prepared, effects, false)?;
+    let (mut best, mut data) = fit_with_assigned_drops(prepared, effects, random_effects)?;
     let times = prepared.drop_times();
     for round in 0..3 {
         data = data.with_estimated_noise(&best.residuals.residual_n, NoiseSource::Detrended);
+        let mut model = best.model.clone();
+        if round == 0 && random_effects != (false, false) {
+            model = fit(&model, &data, COARSE_EFFORT)?.model;
+        }
         let effort = if round == 2 { Effort::FULL } else { COARSE_EFFORT };
-        best = fit(&with_updated_times(best.model, &data, &times), &data, effort)?;
+        best = fit(&with_updated_times(model, &data, &times), &data, effort)?;
     }
     data = data.with_estimated_noise(&best.residuals.residual_n, NoiseSource::Detrended);
     best = fit_from_zero_scatter(&best.model, &data, Effort::FULL)?;

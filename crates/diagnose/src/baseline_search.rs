@@ -4,7 +4,7 @@
 //! shifts the surface, and a search from there stays in that local minimum. If one effect leaves structure, the search therefore also starts
 //! from the base law with the baseline terms whose gain exceeds their BIC penalty; the better of both searches is kept.
 
-use crate::base_law_fit::{PreparedRecordings, fit_from_prior, leaves_noise};
+use crate::base_law_fit::{PreparedRecordings, fit_with_baseline, leaves_noise};
 use crate::effect_selection::{MAX_EFFECTS, Search, SearchStage};
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use crate::random_effect_selection::select_random_effects;
@@ -165,7 +165,7 @@ impl Baseline {
         let terms: Vec<EffectTerm> = infos.iter().map(inactive).collect();
         let fitted = |steps: Vec<Vec<ZeroStep>>| {
             let prepared = prepared.with_zero_steps(steps);
-            let (fit, data) = fit_from_prior(&prepared, &terms)?;
+            let (fit, data) = fit_with_baseline(&prepared, &terms)?;
             Some((prepared, fit, data))
         };
         let gain_of = |other: &(PreparedRecordings, Fit, FitData),

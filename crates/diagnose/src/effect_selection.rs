@@ -8,6 +8,7 @@ use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use crate::motion_period::has_confounded_clock;
 use crate::random_effect_selection::select_random_effects;
 use crate::reweighted_fit::fit_reweighted;
+use crate::selection_restarts::{MAX_BEHIND_SHARE, is_new_effect};
 pub use crate::selection_state::{Search, SearchStage};
 use stylet_identify::evidence_nats::Nats;
 use stylet_identify::fit::{Effort, Fit, fit, fit_if_below};
@@ -21,8 +22,6 @@ use stylet_tissue::ChainStage;
 pub const MAX_EFFECTS: usize = 5;
 /// Candidates that get a short fit.
 const SHORT_FITS: usize = 8;
-/// Largest distance of a candidate from the best, as a share of the best gain, for a full fit.
-const MAX_BEHIND_SHARE: f64 = 0.5;
 /// Candidates that get a full fit after the short one.
 const FULL_FITS: usize = 4;
 
@@ -32,6 +31,8 @@ const MIN_FIRST_ORDER_SHARE: f64 = 0.5;
 const STOP_DISTANCE_NATS: f64 = 100.0;
 /// Largest number of restarts of the current model from a candidate's parameters.
 const MAX_RESTARTS: usize = 4;
+/// Selection steps in which candidates may be refitted from the prior.
+const MAX_PRIOR_STAGES: usize = 2;
 
 /// A short fit on coarse blocks with at most one effect, to compare start values of the layers.
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +62,7 @@ impl Search {
 
     /// A selection before its first step, from a fit that may already have effects.
     pub(crate) fn start(fit: Fit, data: FitData) -> Self {
-        Self { restarts: MAX_RESTARTS, ..Self::from_fit(fit, data) }
+        Self { restarts: MAX_RESTARTS, prior_refits: MAX_PRIOR_STAGES, ..Self::from_fit(fit, data) }
     }
 
     /// Adds effects until none gains enough, or the model has `max_effects` of them.
@@ -116,6 +117,10 @@ impl Search {
         let mut full = self.fit_candidates(&ranked, &coarse, &times);
         if let Some(moved) = full.first().and_then(|f| self.with_boundary_moved(f, &coarse, &times)) {
             full[0] = moved;
+        }
+        if let Some(more) = self.refit_candidates_from_prior(&full, &ranked, &coarse, prepared) {
+            full.extend(more);
+            self.rank(&mut full);
         }
         full.retain(|f| !has_confounded_clock(f, &self.data));
         if self.restart_from_leader(&full) {
@@ -249,14 +254,6 @@ impl Search {
         let mut names: Vec<&str> = Vec::new();
         fits.retain(|f| is_new_effect(&mut names, f));
     }
-}
-
-/// Whether the last effect of a fit is not in `names` yet; adds it.
-fn is_new_effect(names: &mut Vec<&'static str>, f: &Fit) -> bool {
-    let name = f.model.effects.last().map_or("", |e| e.info.id);
-    let new = !names.contains(&name);
-    names.push(name);
-    new
 }
 
 #[cfg(test)]

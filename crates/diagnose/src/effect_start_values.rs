@@ -4,6 +4,7 @@ use crate::base_law_fit::PreparedRecordings;
 use crate::effect_start::EffectStart;
 use crate::rupture_start_values::start_from_ruptures;
 use stylet_identify::fit::JacobianColumn;
+use stylet_identify::force_drops::ForceDrop;
 use stylet_identify::model::EffectTerm;
 use stylet_identify::score_test::{ScoreTest, ScoreTestResult, scale_strengths};
 use stylet_stats::parallel::*;
@@ -274,6 +275,37 @@ fn break_starts(
     out.sort_by(|a, b| b.gain_nats.total_cmp(&a.gain_nats));
     out.truncate(2);
     out
+}
+
+/// Distance (m) within which drops of different recordings belong to one place.
+const SAME_PLACE_M: f64 = 3e-3;
+/// Largest number of places; those with the largest drops are kept.
+const MAX_PLACES: usize = 6;
+
+/// Start values of a breaking elastic element at places where every recording shows a drop, whether or not it is assigned to a layer.
+pub(crate) fn starts_at_common_drops(
+    info: &'static EffectInfo,
+    prepared: &PreparedRecordings,
+) -> Vec<EffectTerm> {
+    let surface = prepared.assumed.tissue.surface_m;
+    let Some((first, others)) = prepared.drops.split_first() else { return Vec::new() };
+    let mut places: Vec<(f64, f64)> = first
+        .iter()
+        .filter_map(|d| {
+            let near = |e: &&ForceDrop| (e.position_m - d.position_m).abs() < SAME_PLACE_M;
+            let same: Vec<&ForceDrop> = others.iter().filter_map(|r| r.iter().find(near)).collect();
+            let n = (same.len() + 1) as f64;
+            let mean = |of: fn(&ForceDrop) -> f64| (of(d) + same.iter().map(|d| of(d)).sum::<f64>()) / n;
+            (same.len() == others.len()).then(|| (mean(|d| d.position_m) - surface, mean(|d| d.size_n)))
+        })
+        .collect();
+    places.sort_unstable_by(|a, b| b.1.total_cmp(&a.1));
+    places.truncate(MAX_PLACES);
+    let from = |(depth, size): (f64, f64)| {
+        let shorter = STRETCHES_M.into_iter().filter(move |s| *s < depth);
+        shorter.map(move |s| EffectTerm::new(info, &[depth - s, size / s, size]))
+    };
+    places.into_iter().flat_map(from).collect()
 }
 
 #[cfg(test)]

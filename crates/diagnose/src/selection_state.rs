@@ -37,6 +37,8 @@ pub struct Search {
     pub stages: Vec<SearchStage>,
     /// Remaining restarts.
     pub(crate) restarts: usize,
+    /// Remaining refits from the prior.
+    pub(crate) prior_refits: usize,
     /// Frequencies (Hz) of tones in the residual.
     pub(crate) tones_hz: Vec<f64>,
 }
@@ -44,7 +46,15 @@ pub struct Search {
 impl Search {
     /// A search that starts from a fit, without restarts.
     pub(crate) fn from_fit(fit: Fit, data: FitData) -> Self {
-        Self { base: fit.clone(), best: fit, data, stages: Vec::new(), restarts: 0, tones_hz: Vec::new() }
+        Self {
+            base: fit.clone(),
+            best: fit,
+            data,
+            stages: Vec::new(),
+            restarts: 0,
+            prior_refits: 0,
+            tones_hz: Vec::new(),
+        }
     }
 
     /// A search with another best fit and its data, without restarts.

@@ -1,6 +1,6 @@
 use super::*;
 use crate::test_fixtures::{assumed_layers, blocks_of, fit_simulated, gel_tissue};
-use stylet_tissue::CoulombFriction;
+use stylet_tissue::{CoulombFriction, Effect};
 
 fn blocks(f: impl Fn(f64) -> f64) -> BlockAverages {
     let t: Vec<f64> = (0..400).map(|k| 0.02 * f64::from(k)).collect();
@@ -57,6 +57,12 @@ fn prepared_gel(c_n_per_m: f64) -> (PreparedRecordings, FitData) {
 }
 
 /// No random effects.
+const NO_RANDOM_EFFECTS: (bool, bool) = (false, false);
+
+fn dry_friction() -> EffectTerm {
+    EffectTerm::new(CoulombFriction::default().info(), &[1.0])
+}
+
 #[test]
 fn base_law_is_identified_from_the_prior() {
     let (prepared, _) = prepared_gel(0.0);
@@ -65,6 +71,20 @@ fn base_law_is_identified_from_the_prior() {
     assert!((fitted.stiffness_n_per_m / truth.stiffness_n_per_m - 1.0).abs() < 0.02, "{fitted:?}");
     assert!(f.model.effects.is_empty() && f.model.rupture_times_s.iter().all(|t| t[0].is_finite()));
     assert!((2e-3..2e-2).contains(&data.noise.sd_n()), "{}", data.noise.sd_n());
+}
+
+#[test]
+fn full_and_coarse_refits_recover_the_strength_of_an_effect() {
+    let (prepared, data) = prepared_gel(60.0);
+    let strength = |f: Option<Fit>| f.expect("a fit").model.effects[0].values[0];
+    let coarse = data.with_recordings(data.recordings.iter().map(|b| b.coarsened(3)).collect());
+    for fitted in [
+        refit_from_prior(&prepared, &[dry_friction()], NO_RANDOM_EFFECTS, &data),
+        coarse_refit(&prepared, &[dry_friction()], NO_RANDOM_EFFECTS, &coarse),
+    ] {
+        let fitted = strength(fitted);
+        assert!((fitted / 60.0 - 1.0).abs() < 0.2, "{fitted}");
+    }
 }
 
 #[test]
@@ -91,7 +111,7 @@ fn coarse_refit_uses_the_coarse_blocks_only() {
     let coarse = data.with_recordings(data.recordings.iter().map(|b| b.coarsened(3)).collect());
     let less = PreparedRecordings { blocks: Arc::clone(&coarse.recordings), ..prepared.clone() };
     let fitted = |p: &PreparedRecordings| {
-        let f = coarse_refit(p, &coarse).expect("a fit");
+        let f = coarse_refit(p, &[dry_friction()], NO_RANDOM_EFFECTS, &coarse).expect("a fit");
         (f.nats(), f.model.tissue.layers[0].stiffness_n_per_m)
     };
     assert_eq!(fitted(&prepared), fitted(&less));
@@ -102,7 +122,7 @@ fn coarse_refit_uses_the_coarse_blocks_only() {
 #[test]
 fn drops_are_assigned_under_a_wide_noise() {
     let (prepared, _) = prepared_gel(60.0);
-    let (fitted, data) = fit_with_assigned_drops(&prepared, &[], false).expect("a fit");
+    let (fitted, data) = fit_with_assigned_drops(&prepared, &[], NO_RANDOM_EFFECTS).expect("a fit");
     assert!((data.noise.sd_n() / (FIRST_NOISE_SHARE * prepared.largest_force_n()) - 1.0).abs() < 1e-12);
     let rough_n = roughness(&prepared.blocks);
     assert!(rough_n < 0.5 * data.noise.sd_n());

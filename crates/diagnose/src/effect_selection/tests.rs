@@ -1,16 +1,19 @@
 use super::*;
 use crate::base_law_fit::MAX_REPLAYS;
 use crate::model_pruning::{effect_at_bound, required_gain_nats, strengths_are_determined};
+use crate::repeated_insertions::SegmentedRecording;
 use crate::repeated_insertions::multistart_fit::SetFit;
 use crate::test_fixtures::{
     assumed_layers, blocks_of, data_of, fit_from_truth, fit_simulated, recordings_with_added_force,
     search_stage,
 };
+use rand::rngs::ChaCha8Rng;
+use rand::{RngExt, SeedableRng};
 use std::sync::atomic::Ordering;
 use stylet_identify::model::{EffectTerm, ParameterRole};
 use stylet_tissue::{
-    AnyEffect, AsymmetricFriction, CoulombFriction, Effect, ForceBias, ForceDrift, PeriodicInterference,
-    StribeckFriction,
+    AnyEffect, AsymmetricFriction, CoulombFriction, Effect, ForceBias, ForceDrift, HiddenMembrane,
+    PeriodicInterference, StribeckFriction,
 };
 
 fn data() -> FitData {
@@ -139,7 +142,13 @@ fn search_over(
     fitted: &[AnyEffect],
     more_n: impl Fn(f64) -> f64,
 ) -> (Search, PreparedRecordings) {
-    let runs = recordings_with_added_force(there, &[[4e-3, 3e-4], [5e-3, -3e-4], [6e-3, 0.0]], more_n);
+    search_of(
+        &recordings_with_added_force(there, &[[4e-3, 3e-4], [5e-3, -3e-4], [6e-3, 0.0]], more_n),
+        fitted,
+    )
+}
+
+fn search_of(runs: &[SegmentedRecording], fitted: &[AnyEffect]) -> (Search, PreparedRecordings) {
     let f = fit_from_truth(fitted, &runs.iter().collect::<Vec<_>>());
     let prepared = PreparedRecordings::new(f.fit.model.assumed.clone(), f.data.recordings.to_vec(), 0.0);
     (Search::from_fit(f.fit, f.data), prepared)
@@ -242,6 +251,74 @@ fn reweighted_search_finds_the_drift() {
 }
 
 #[test]
+fn candidates_are_refitted_from_the_prior_when_the_leader_leaves_more_than_noise() {
+    let there = HiddenMembrane { depth_m: 2e-3, stiffness_n_per_m: 120.0, puncture_n: 0.36 };
+    let membrane: AnyEffect = there.into();
+    let (mut search, prepared) = search_over(std::slice::from_ref(&membrane), &[], |_| 0.0);
+    let start = |e: &AnyEffect| {
+        let choice = EffectTerm::new(e.info(), &e.parameters());
+        vec![EffectStart { choice, gain_nats: 1.0, detectable_nats: 1.0, model: None }]
+    };
+    let good = [with(&search, &dry_friction(1.0))];
+    let mut full = good.clone();
+    full[0].model.tissue.layers[0].stiffness_n_per_m *= 0.8;
+    let weak = [start(&drift(1e-4)), start(&ForceBias { force_n: 1e-3 }.into())];
+    let ranked = [weak.to_vec(), vec![start(&membrane); 4]].concat();
+    let started = |search: &mut Search, full: &[Fit], ranked: &[Vec<EffectStart>], prior_refits: usize| {
+        search.prior_refits = prior_refits;
+        let names =
+            search.refit_candidates_from_prior(full, ranked, &search.coarse(), &prepared).map(|all| {
+                all.iter().map(|f| f.model.effects.last().map_or("", |e| e.info.id)).collect::<Vec<_>>()
+            });
+        (names, search.prior_refits)
+    };
+    // Each effect once, and none with less than half of the best gain.
+    assert_eq!(started(&mut search, &full, &ranked, 2), (Some(vec!["hidden_membrane"]), 1));
+    assert_eq!(started(&mut search, &full, &ranked[..3], 1), (Some(vec!["hidden_membrane"]), 0));
+    // Breaking elements also start at the force drops.
+    assert_eq!(started(&mut search, &good, &ranked, 2), (Some(vec!["hidden_membrane"]), 1));
+    assert_eq!(started(&mut search, &full, &ranked, 0), (None, 0));
+    assert_eq!(started(&mut search, &[], &ranked, 2), (None, 2));
+    // The first that leaves only noise ends the refits.
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut normal = || (0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0;
+    let noise_n: Vec<f64> = (0..1000).map(|_| 0.05 * normal()).collect();
+    let drifting_runs = recordings_with_added_force(&[], &[[4e-3, 0.0], [6e-3, 0.0]], |t| {
+        0.05 * t + noise_n[(50.0 * t).round() as usize]
+    });
+    let (mut drifts, prepared_too) = search_of(&drifting_runs, &[]);
+    drifts.prior_refits = 1;
+    let full_too = [with(&drifts, &dry_friction(1.0))];
+    let names = |all: Vec<Fit>| all.iter().map(|f| f.model.effects[0].info.id).collect::<Vec<_>>();
+    let begun_too = drifts
+        .refit_candidates_from_prior(
+            &full_too,
+            &vec![start(&drift(1e-4)); 4],
+            &drifts.coarse(),
+            &prepared_too,
+        )
+        .map(names);
+    assert_eq!(begun_too, Some(vec!["force_drift"]));
+    // Noise alone, and noise with a slow force.
+    let mut rng = ChaCha8Rng::seed_from_u64(1);
+    let mut leader = full[0].clone();
+    for e in &mut leader.residuals.residual_n {
+        e.iter_mut().for_each(|e| *e = 0.01 * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0));
+    }
+    let leaves = |slow_n: f64| {
+        let mut f = leader.clone();
+        for e in &mut f.residuals.residual_n {
+            e.iter_mut().enumerate().for_each(|(k, e)| *e += slow_n * (0.02 * k as f64).sin());
+        }
+        let normalised = |e: &Vec<f64>| e.iter().map(|e| e / 0.01).collect();
+        f.residuals.innovations = f.residuals.residual_n.iter().map(normalised).collect();
+        [f]
+    };
+    assert_eq!(started(&mut search, &leaves(0.0), &ranked, 2), (None, 2));
+    assert_eq!(started(&mut search, &leaves(0.03), &ranked, 2).1, 1);
+}
+
+#[test]
 fn effect_stays_when_it_gains_four_nats_more_than_its_penalty() {
     let mut counts = [0, 0];
     for bias_n in [0.0, 2e-3, 3e-3, 4e-3, 5e-3, 6e-3, 8e-3] {
@@ -262,11 +339,17 @@ fn effect_stays_when_it_gains_four_nats_more_than_its_penalty() {
 }
 
 /// One step of a search and its start values; with the noise of the calm parts or of the whole residual.
-fn grown(calm: bool, there: &[AnyEffect], more_n: impl Fn(f64) -> f64) -> (Search, Vec<EffectStart>) {
+fn grown(
+    calm: bool,
+    prior_refits: usize,
+    there: &[AnyEffect],
+    more_n: impl Fn(f64) -> f64,
+) -> (Search, Vec<EffectStart>) {
     let (mut search, prepared) = search_over(there, &[], more_n);
     if calm {
         search.accept(search.best.clone());
     }
+    search.prior_refits = prior_refits;
     let first = effect_starts(&ScoreTest::new(&search.best, &search.data), &prepared, &[]);
     let any = search.add_effect(&prepared);
     assert_eq!(any, search.stages.last().is_some_and(|s| s.selected.is_some()));
@@ -277,7 +360,7 @@ fn grown(calm: bool, there: &[AnyEffect], more_n: impl Fn(f64) -> f64) -> (Searc
 fn effect_is_fitted_when_its_first_order_gain_is_half_of_the_required() {
     let mut counts = [0, 0];
     for drift_n_per_s in [6e-4, 8e-4] {
-        let (search, first) = grown(false, &[], |t| drift_n_per_s * t);
+        let (search, first) = grown(false, 0, &[], |t| drift_n_per_s * t);
         let tried = |s: &EffectStart| search.stages[0].candidates.iter().any(|r| r.0 == s.choice.info.id);
         for s in first.iter().filter(|s| s.choice.info.stage != ChainStage::Puncture) {
             let parameters = s.choice.info.parameters.len() as f64;
@@ -295,8 +378,8 @@ fn effect_is_fitted_when_its_first_order_gain_is_half_of_the_required() {
 
 #[test]
 fn candidates_far_behind_get_no_full_fit() {
-    let names = |there: &[AnyEffect], drift_n_per_s: f64| {
-        let (search, _) = grown(true, there, |t| drift_n_per_s * t);
+    let names = |there: &[AnyEffect], prior_refits: usize, drift_n_per_s: f64| {
+        let (search, _) = grown(true, prior_refits, there, |t| drift_n_per_s * t);
         let price =
             |parameters: usize| 0.5 * parameters as f64 * (search.data.compared_block_count() as f64).ln();
         let penalty_of: Vec<f64> = search.stages[0].candidates.iter().map(|r| r.1 - price(r.2)).collect();
@@ -304,15 +387,15 @@ fn candidates_far_behind_get_no_full_fit() {
         search.stages[0].candidates.iter().map(|r| r.0).collect::<Vec<_>>()
     };
     let punctures = "rate_dependent_puncture";
-    assert_eq!(names(&[], 0.02), ["force_drift", "force_bias", "position_dependent_force", punctures]);
+    assert_eq!(names(&[], 0, 0.02), ["force_drift", "force_bias", "position_dependent_force", punctures]);
     // Within thirty nats of the best no candidate is dropped.
     assert_eq!(
-        names(&[], 3e-4),
+        names(&[], 0, 3e-4),
         ["respiration", "cutting_force", "asymmetric_friction", "position_dependent_force", punctures]
     );
     // A candidate with a large penalty may gain more than others and still rank behind them.
     assert_eq!(
-        names(&[dry_friction(50.0)], 0.0),
+        names(&[dry_friction(50.0)], 0, 0.0),
         ["respiration", "nonlinear_elasticity", "drive_friction", "hidden_membrane", punctures]
     );
 }

@@ -4,7 +4,6 @@ use crate::test_fixtures::{
     assumed_layers, blocks_of, data_of, fit_from_truth, fit_simulated, recordings_with_added_force,
 };
 use stylet_identify::fit::Fit;
-use stylet_identify::force_drops::ForceDrop;
 use stylet_identify::likelihood::residuals;
 use stylet_identify::model::Model;
 use stylet_tissue::{
@@ -312,6 +311,35 @@ fn breaks_are_tried_at_unassigned_drops_and_on_a_grid() {
         let starts = breaks_at(&[(at, 1.0), (at - before_m, 1.0)]);
         assert!((starts - wanted_m).abs() < 1e-9, "{starts}");
     }
+}
+
+#[test]
+fn breaks_are_tried_at_drops_common_to_all_recordings() {
+    let f = fitted_without(&[]);
+    let surface_m = f.fit.model.assumed.tissue.surface_m;
+    let drop = |(depth_m, size_n): (f64, f64)| ForceDrop {
+        time_s: 1.0,
+        position_m: surface_m + depth_m,
+        size_n,
+        score: 9.0,
+    };
+    let mut prepared = PreparedRecordings::new(f.fit.model.assumed.clone(), f.data.recordings.to_vec(), 0.0);
+    let starts = |prepared: &PreparedRecordings| {
+        let at = |c: &EffectTerm| (c.values[0] + c.values[2] / c.values[1], c.values[2]);
+        super::starts_at_common_drops(info("hidden_membrane"), prepared).iter().map(at).collect::<Vec<_>>()
+    };
+    // One place within three millimetres, another one missing in a recording.
+    prepared.drops = [[(5e-3, 0.2), (12e-3, 0.9)], [(6e-3, 0.3), (20e-3, 0.9)], [(7e-3, 0.4), (12e-3, 0.9)]]
+        .map(|of| of.map(drop).to_vec())
+        .to_vec();
+    let found = starts(&prepared);
+    // Only stretches of 0.8 and 3 mm are shorter than the depth.
+    assert_eq!(found.len(), 2);
+    for (depth_m, size_n) in found {
+        assert!((depth_m - 6e-3).abs() < 1e-9 && (size_n - 0.3).abs() < 1e-9, "{depth_m} {size_n}");
+    }
+    prepared.drops[1].clear();
+    assert_eq!(starts(&prepared), []);
 }
 
 #[test]
