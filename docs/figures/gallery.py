@@ -131,7 +131,7 @@ def verdict(diagnosis, effect="", absorbed=False):
 
 def before_and_after(before, after, named):
     """The panels of the residuals, at the scale of the first."""
-    y_range = limits([before[1]])
+    y_range = limits([before[1], [0.0]])
     return [
         *heading(297, "residual of the assumed model", [(None, "measured less simulated; grey: noise")]),
         *panel([(BLUE, *before)], "time (s)", "residual (N)", 297, 195, y_range, 2 * NOISE_N),
@@ -214,7 +214,7 @@ def effects(stylet):
 
 
 ONE_SPEED = "Program(start_m: -0.005, segments: [Move(velocity_mps: 0.004, duration_s: 12.0), Move(velocity_mps: -0.004, duration_s: 12.0)])"
-NO_RETRACTION = "Program(start_m: -0.005, segments: [Move(velocity_mps: 0.004, duration_s: 12.0), Hold(duration_s: 5.0)])"
+NO_RETRACTION = "Program(start_m: -0.005, segments: [Move(velocity_mps: 0.004, duration_s: 14.0)])"
 # Another specimen, with twice the friction.
 OTHER_SPECIMEN = [("friction_ns_per_m2: 3000.0", "friction_ns_per_m2: 6000.0"), ("friction_ns_per_m2: 4000.0", "friction_ns_per_m2: 8000.0")]
 
