@@ -1,8 +1,8 @@
 //! No disk fault or kill mixes results. Wherever a command is killed, terminated or gets a write error, its folder holds the old or the new
 //! set; a failed command reports what, where and why, and leaves the old set.
 //!
-//! `tests/disk_faults/shim.c` injects the faults at calls that change the disk. By default into `run` (every seventh call) and `sweep` (every
-//! 61st); `tests/disk_faults.sh` takes all calls of all commands, and a hundred kills at random times.
+//! `tests/disk_faults/shim.c` injects the faults at every call that changes the disk. By default into `run` and `sweep`;
+//! `tests/disk_faults.sh` takes all commands, and a hundred kills at random times.
 #![cfg(target_os = "linux")]
 
 #[path = "disk_faults/server.rs"]
@@ -184,13 +184,13 @@ fn out_of(scratch: &Scratch) -> PathBuf {
 }
 
 #[test]
-fn run_and_sweep_survive_faults_at_sampled_calls() {
+fn run_and_sweep_survive_every_fault_at_every_third_call() {
     let scratch = Scratch::in_memory("faults");
     let Some(shim) = shim(scratch.path()) else { return };
     let cases = cases(&scratch);
-    let run = every_fault(&shim, &cases[0], &out_of(&scratch), "kateEnNs", 7);
-    let sweep = every_fault(&shim, &cases[1], &out_of(&scratch), "kes", 61);
-    assert!(run > 60 && sweep > 8, "{run} and {sweep} faults");
+    let run = every_fault(&shim, &cases[0], &out_of(&scratch), "kateEnNs", 3);
+    let sweep = every_fault(&shim, &cases[1], &out_of(&scratch), "kes", 31);
+    assert!(run > 150 && sweep > 20, "{run} and {sweep} faults");
 }
 
 #[test]

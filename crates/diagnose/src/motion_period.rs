@@ -1,4 +1,5 @@
-//! Period of the commanded motion: at its harmonics, and below one period per recording, a periodic cause is not distinguishable from a force that depends on the motion.
+//! Period of the commanded motion: at its harmonics, and below one period per recording, a periodic cause is not distinguishable from a force
+//! that depends on the motion.
 
 use crate::selection_state::Search;
 use stylet_identify::block_averages::BlockAverages;
