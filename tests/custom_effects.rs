@@ -73,6 +73,7 @@ fn a_hidden_custom_effect_is_found_and_one_that_is_not_there_is_not() {
 }
 
 #[test]
+#[ignore = "half a minute; tests/accuracy.sh"]
 fn a_force_outside_the_library_gets_formulas_and_the_best_is_found_as_a_custom_effect() {
     // A periodic force over depth, as of a grooved needle.
     let grooves =

@@ -18,7 +18,7 @@ for ((seed = first; seed < first + rounds; seed++)); do
         }
     done <<'CRATES'
 tissue --test base_law --test effect_library --test measurement_chain --test needle_compliance --test shaft_slip
-plan --test limits_are_kept
+plan --test motion_limits
 sweep --test distributions
 scenario --lib --test promises
 record --lib --test reading --test round_trip

@@ -53,6 +53,7 @@ fn numbers_wrong_by_a_factor_up_to_three_are_found_and_said_and_nothing_is_accus
 
 /// Each of these effects shifts the layers that a fit without it finds.
 #[test]
+#[ignore = "half a minute; tests/accuracy.sh"]
 fn one_effect_is_named_alone_although_the_numbers_are_guessed() {
     for (severity, index, effect) in [
         (Severity::Large, 2, "saturation"),
