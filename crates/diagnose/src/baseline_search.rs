@@ -156,7 +156,8 @@ impl Baseline {
             base.model.assumed.candidates().filter(|i| i.baseline).collect();
         let candidates = zero_step_candidates(prepared);
         let jumps_up = candidates.steps.iter().flatten().any(|s| s.size_n > 0.0);
-        if !jumps_up && unassigned(&candidates.drops, base).next().is_none() && !may_pay(&infos, base, data) {
+        if !jumps_up && unassigned(&candidates.drops, base).next().is_none() && !may_gain(&infos, base, data)
+        {
             return None;
         }
         let inactive = |i: &&'static EffectInfo| {
@@ -238,15 +239,15 @@ impl Baseline {
 }
 
 /// Whether the first-order gain of any baseline effect exceeds its penalty.
-fn may_pay(infos: &[&'static EffectInfo], base: &Fit, data: &FitData) -> bool {
+fn may_gain(infos: &[&'static EffectInfo], base: &Fit, data: &FitData) -> bool {
     let score_test = ScoreTest::new(base, data);
     let offset_needed = bic_penalty(1, data.compared_block_count()) + MIN_GAIN_NATS;
-    let offset_pays = |recording: usize| {
+    let is_offset_needed = |recording: usize| {
         let ones = |(r, b): (usize, &BlockAverages)| vec![f64::from(u8::from(r == recording)); b.len()];
         let force: Vec<Vec<f64>> = data.recordings.iter().enumerate().map(ones).collect();
         score_test.gain(&[score_test.force_column(&force)]).nats > offset_needed
     };
-    if (0..data.recording_count()).any(offset_pays) {
+    if (0..data.recording_count()).any(is_offset_needed) {
         return true;
     }
     let is_needed = |info: &&'static EffectInfo| {
