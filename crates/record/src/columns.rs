@@ -5,8 +5,8 @@ use std::path::Path;
 use crate::column_map::{Column, ColumnMap};
 use crate::error::RecordError;
 use crate::recording::JOINTS;
-use crate::text::layout::ColumnKind;
-use crate::units::{Dimension, Unit, quantity_of, split_name};
+use crate::text::layout::{ColumnKind, ColumnSample};
+use crate::units::{Dimension, Unit, is_commanded, quantity_of, split_name, vector_of};
 
 /// Quantity of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,6 +68,8 @@ pub(crate) struct TableHead<'a> {
     /// Units from a row of units or from typed columns.
     pub units: &'a [Option<Unit>],
     pub kinds: &'a [ColumnKind],
+    /// Values in some rows of a text; empty for other formats.
+    pub samples: &'a [ColumnSample],
 }
 
 /// How the parts of a column make one value.
@@ -157,6 +159,7 @@ pub(crate) fn map_columns(
                 };
                 found.add(head, mapped);
             }
+            found.check_clocks(head)?;
             Ok(found)
         }
     }
@@ -228,6 +231,11 @@ impl MappedColumns {
             }
         }
         self.columns.push(column);
+    }
+
+    fn check_clocks(&self, head: TableHead<'_>) -> Result<(), RecordError> {
+        let indices = |role| self.of(role).map_or(&[][..], |column| column.indices.as_slice());
+        check_clocks(head, indices(ColumnRole::Position), indices(ColumnRole::Force))
     }
 
     /// Places of all parts, in the order of the columns.
@@ -362,6 +370,7 @@ fn without_map(head: TableHead<'_>) -> Result<MappedColumns, RecordError> {
     for role in REQUIRED {
         found.add(head, open(head, role, &[])?);
     }
+    found.check_clocks(head)?;
     let mut own = |role, name: &str| -> Result<bool, RecordError> {
         let index = place(head, name)?;
         if let Some(index) = index {
@@ -390,18 +399,22 @@ fn open(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Result<Mapped
     if let Some(index) = place(head, own)? {
         return Ok(mapped(head, role, vec![index], &Column { scale: Some(1.0), ..column }).named_only());
     }
-    // Seconds and nanoseconds, as `ros2 topic echo --csv` prints them.
-    let stamp = |part: &str| head.names.iter().position(|name| name == part);
-    if let (ColumnRole::Time, Some(s), Some(ns)) =
-        (role, stamp("header.stamp.sec"), stamp("header.stamp.nanosec"))
-    {
-        return Ok(mapped(head, role, vec![s, ns], &column));
+    // Seconds and nanoseconds, as ROS prints them.
+    let place_of = |part: &str| head.names.iter().position(|name| name == part);
+    for (s, ns) in [("header.stamp.sec", "header.stamp.nanosec"), ("secs", "nsecs"), ("sec", "nanosec")] {
+        if let (ColumnRole::Time, Some(s), Some(ns)) = (role, place_of(s), place_of(ns)) {
+            return Ok(mapped(head, role, vec![s, ns], &column));
+        }
     }
     let found = unmistakable(head, role, taken);
     match found.as_slice() {
         [index] => Ok(mapped(head, role, vec![*index], &column)),
         [] => Err(missing(head, own, what)),
-        [first, ..] if role == ColumnRole::Time => Ok(mapped(head, role, vec![*first], &column)),
+        [first, ..] if role == ColumnRole::Time => {
+            // A date with whole seconds may stand beside the time of the samples.
+            let increases = |index: &&usize| head.samples.get(**index).is_some_and(|s| s.increases);
+            Ok(mapped(head, role, vec![*found.iter().find(increases).unwrap_or(first)], &column))
+        }
         several => Err(RecordError::SeveralColumns {
             path: head.path.to_owned(),
             line: head.line,
@@ -445,11 +458,69 @@ fn unmistakable(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Vec<u
         .copied()
         .filter(|index| quantity_of(&split_name(&head.names[*index]).base) == Some(role.dimension()))
         .collect();
-    let found = if by_name.is_empty() { with_unit } else { by_name };
-    // Columns without any value are candidates only if all are.
-    let filled: Vec<usize> =
-        found.iter().copied().filter(|index| kind(*index) != ColumnKind::Empty).collect();
-    if filled.is_empty() { found } else { filled }
+    let found = if by_name.is_empty() { with_unit.clone() } else { by_name };
+    // Columns without any value, and commands beside measurements, are candidates only if all are.
+    let found = those_or_all(found, |index| kind(index) != ColumnKind::Empty);
+    let found = those_or_all(found, |index| !is_commanded(&head.names[index]));
+    if let ([index], ColumnRole::Position | ColumnRole::Force) = (found.as_slice(), role) {
+        let rival =
+            with_unit.iter().copied().find(|other| other != index && is_rival(head, role, *index, *other));
+        return std::iter::once(*index).chain(rival).collect();
+    }
+    found
+}
+
+/// The columns for which `keep` holds; all if there is none.
+fn those_or_all(columns: Vec<usize>, keep: impl Fn(usize) -> bool) -> Vec<usize> {
+    let kept: Vec<usize> = columns.iter().copied().filter(|index| keep(*index)).collect();
+    if kept.is_empty() { columns } else { kept }
+}
+
+/// Ratio of the ranges of two columns of one quantity from which the wider one may be meant although its name says less.
+const RIVAL_RANGE: f64 = 3.0;
+/// The same for components of a position: the motion is oblique to the axis that the name says.
+const OBLIQUE_RANGE: f64 = 0.3;
+
+/// Whether another column of the same quantity varies so much that the name alone does not decide.
+fn is_rival(head: TableHead<'_>, role: ColumnRole, index: usize, other: usize) -> bool {
+    let vector = |index: usize| vector_of(&head.names[index]);
+    let is_component = vector(index).is_some() && vector(index) == vector(other);
+    let factor = if is_component && role == ColumnRole::Position { OBLIQUE_RANGE } else { RIVAL_RANGE };
+    let range = |index: usize| {
+        let scale = unit_of(head, index).map_or(1.0, |unit| unit.to_si);
+        head.samples.get(index).map_or(f64::NAN, |sample| scale * sample.range())
+    };
+    range(other) > factor * range(index)
+}
+
+/// Checks that position and force have one clock: in `t1, force, t2, position` each follows a time of its own.
+///
+/// # Errors
+/// [`RecordError::TwoClocks`].
+pub(crate) fn check_clocks(
+    head: TableHead<'_>,
+    position: &[usize],
+    force: &[usize],
+) -> Result<(), RecordError> {
+    let clock = |indices: &[usize]| -> Option<usize> {
+        let before = indices.first()?.checked_sub(1)?;
+        let is_time = unit_of(head, before).is_some_and(|unit| unit.dimension == Dimension::Time)
+            || head.kinds.get(before) == Some(&ColumnKind::Date);
+        is_time.then_some(before)
+    };
+    let (Some(of_position), Some(of_force)) = (clock(position), clock(force)) else { return Ok(()) };
+    let (Some(a), Some(b)) = (head.samples.get(of_position), head.samples.get(of_force)) else {
+        return Ok(());
+    };
+    if of_position == of_force || !a.differs_as_clock(b) {
+        return Ok(());
+    }
+    Err(RecordError::TwoClocks {
+        path: head.path.to_owned(),
+        line: head.line,
+        force: head.names[of_force].clone(),
+        position: head.names[of_position].clone(),
+    })
 }
 
 /// Header name of the torque of a joint (0-based); names count from one.

@@ -85,6 +85,14 @@ pub enum RecordError {
     )]
     SeveralColumns { path: PathBuf, line: u64, what: &'static str, field: &'static str, columns: Vec<String> },
 
+    /// Position and force were sampled with different clocks.
+    #[error(
+        "{}: line {line}: the force has the time \"{force}\", the position the time \"{position}\", and they differ; save the position with \
+         its time in a file of its own, and join it by a column map: position: (file: \"position.csv\")",
+        path.display()
+    )]
+    TwoClocks { path: PathBuf, line: u64, force: String, position: String },
+
     /// The name of a required column occurs more than once.
     #[error("{}: line {line}: the header names the column \"{column}\" twice; rename the one that is not meant", path.display())]
     AmbiguousColumn { path: PathBuf, line: u64, column: String },

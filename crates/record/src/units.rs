@@ -144,11 +144,13 @@ pub struct NameParts {
 /// `Force kN`. A unit of one letter behind `_` or a blank counts only when the name is of its quantity.
 #[must_use]
 pub fn split_name(name: &str) -> NameParts {
-    let name = name.trim();
+    // `Force_N_` and `Force..N.` are what MATLAB and R make of `Force (N)`.
+    let name = name.trim().trim_end_matches(['_', '.']);
     let whole = || NameParts { base: name.to_owned(), unit: None };
     for (open, close) in [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>')] {
         if let (Some(from), Some(to)) = (name.rfind(open), name.rfind(close))
             && from < to
+            && !name[from + 1..to].bytes().all(|b| b.is_ascii_digit())
             && let Some(unit) = parse_unit(&name[from + 1..to])
         {
             let rest = format!("{} {}", &name[..from], &name[to + close.len_utf8()..]);
@@ -170,7 +172,10 @@ pub fn split_name(name: &str) -> NameParts {
             && let Some(unit) = parse_unit(text)
         {
             let plain = text.chars().all(char::is_alphabetic);
-            let same = quantity_of(base) == Some(unit.dimension);
+            // `Fx_N` has the unit of `Fz_N`.
+            let as_z = base.strip_suffix(['x', 'y']).map(|stem| format!("{stem}z"));
+            let is_quantity = |base: &str| quantity_of(base) == Some(unit.dimension);
+            let same = is_quantity(base) || as_z.is_some_and(|base| is_quantity(&base));
             let long = text.chars().count() > 1 && !matches!(text, "in" | "min" | "au" | "ma" | "mv");
             if plain && (same || (long && unit.dimension != Dimension::Other && quantity_of(base).is_none()))
             {
@@ -221,6 +226,8 @@ const LENGTH_WORDS: &[&str] = &[
     "weg",
     "verschiebung",
     "traversenweg",
+    "standardweg",
+    "lvdt",
     "deplacement",
     "déplacement",
     "przemieszczenie",
@@ -255,6 +262,7 @@ const FORCE_WORDS: &[&str] = &[
     "last",
     "belastung",
     "standardkraft",
+    "thrust",
     "prüfkraft",
     "siła",
     "sila",
@@ -270,36 +278,65 @@ const FORCE_WORDS: &[&str] = &[
     "loadcell",
     "newtons",
 ];
+/// Words of a quantity that is commanded, not measured.
+const COMMAND_WORDS: &[&str] =
+    &["cmd", "command", "commanded", "target", "setpoint", "desired", "goal", "soll", "demand", "reference"];
+/// Words of what is neither time nor position nor force.
+const OTHER_WORDS: &[&str] = &[
+    "torque",
+    "moment",
+    "strain",
+    "stress",
+    "temperature",
+    "orientation",
+    "angle",
+    "acceleration",
+    "stiffness",
+    "counts",
+    "ticks",
+    "sequence",
+];
+/// Further such words, unless another word says which quantity it is, as in `current position`.
+const FURTHER_OTHER_WORDS: &[&str] =
+    &["current", "voltage", "volt", "volts", "status", "index", "seq", "joint", "q"];
 const VELOCITY_WORDS: &[&str] =
     &["velocity", "vel", "speed", "v", "vz", "geschwindigkeit", "vitesse", "prędkość", "velocidad"];
+
+/// Whether a name has one of these words, with or without a number behind it; a word of four letters may be a part of another one.
+fn has_word(name: &str, list: &[&str]) -> bool {
+    let lower = name.to_lowercase();
+    let mut words = lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
+    words.any(|word| {
+        let stem = word.trim_end_matches(|c: char| c.is_ascii_digit());
+        let is_part =
+            |known: &&str| known.chars().count() >= 4 && (word.starts_with(*known) || word.ends_with(*known));
+        list.contains(&word) || list.contains(&stem) || list.iter().any(|known| is_part(&known))
+    })
+}
+
+/// Whether a name denotes what is commanded, not measured.
+pub(crate) fn is_commanded(name: &str) -> bool {
+    has_word(name, COMMAND_WORDS)
+}
+
+/// Whether a name denotes none of the quantities of a recording, such as a torque, a current or a counter.
+pub(crate) fn is_other(name: &str) -> bool {
+    has_word(name, OTHER_WORDS) || (quantity_of(name).is_none() && has_word(name, FURTHER_OTHER_WORDS))
+}
+
+/// The name of the vector whose component a name denotes: `force` of `force.z`, `pose_` of `pose_2`.
+pub(crate) fn vector_of(name: &str) -> Option<String> {
+    let name = split_name(name).base.to_lowercase();
+    let stem = name.strip_suffix(['x', 'y', 'z', '0', '1', '2', '3', '4', '5', '6'])?;
+    Some(stem.to_owned())
+}
 
 /// Dimension of the quantity that a name without unit denotes.
 #[must_use]
 pub fn quantity_of(base: &str) -> Option<Dimension> {
-    let lower = base.to_lowercase();
-    let words: Vec<&str> = lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).collect();
-    let has = |list: &[&str]| {
-        words.iter().any(|word| {
-            let stem = word.trim_end_matches(|c: char| c.is_ascii_digit());
-            list.contains(word)
-                || list.contains(&stem)
-                || list.iter().any(|known| {
-                    known.chars().count() >= 4 && (word.starts_with(known) || word.ends_with(known))
-                })
-        })
-    };
+    let has = |list: &[&str]| has_word(base, list);
     // `wrench.force.z` is a force, `pose.position.z` a position, `joint_velocity` a velocity.
-    if has(&[
-        "torque",
-        "moment",
-        "strain",
-        "stress",
-        "temperature",
-        "orientation",
-        "angle",
-        "acceleration",
-        "stiffness",
-    ]) {
+    if has(OTHER_WORDS) {
         return None;
     }
     [

@@ -4,13 +4,13 @@ use super::magnitude::{EPOCH_S, epoch_unit, is_implausible, propose_units};
 use super::scan::{ColumnScan, Scan};
 use super::{Candidate, Role, UnitProposal};
 use crate::column_map::{Column, ColumnMap};
-use crate::columns::{ColumnRole, MappedColumn, Parts, TableHead, find_role, unit_of};
+use crate::columns::{ColumnRole, MappedColumn, Parts, TableHead, check_clocks, find_role, unit_of};
 use crate::error::RecordError;
 use crate::insertion_axis::project;
 use crate::text::layout::ColumnKind;
 use crate::text::rows::RowsRead;
 use crate::time_order::MIN_SAMPLE_NUMBERS;
-use crate::units::{Dimension, quantity_of, split_name};
+use crate::units::{Dimension, is_commanded, is_other, quantity_of, split_name, vector_of};
 
 /// Share of the variance from which one of three components is used instead of all.
 const MAIN_COMPONENT_SHARE: f64 = 0.99;
@@ -154,7 +154,9 @@ pub(super) fn choose(head: TableHead<'_>, scan: &Scan, read: &RowsRead, map: Opt
         rate_hz,
         counts_samples: false,
     };
-    let mut taken: Vec<usize> = Vec::new();
+    // Of recordings side by side, the first one is suggested.
+    let first_block = repeated_after(head.names);
+    let mut taken: Vec<usize> = (first_block..head.names.len()).collect();
     for role in ROLES {
         let column = match role {
             Role::Time => &given.time,
@@ -176,8 +178,20 @@ pub(super) fn choose(head: TableHead<'_>, scan: &Scan, read: &RowsRead, map: Opt
         taken.extend(&found.indices);
         chosen.add(head, (scan, read), role, found, certain);
     }
+    if let Err(error) = check_clocks(head, chosen.indices(Role::Position), chosen.indices(Role::Force)) {
+        chosen.errors.push((Role::Time, error));
+    }
     chosen.map_needed = !chosen.errors.is_empty();
     chosen
+}
+
+/// Number of columns after which all names are repeated, as of several recordings side by side; else the number of columns.
+fn repeated_after(names: &[String]) -> usize {
+    let all = names.len();
+    let repeats = |count: &usize| {
+        all.is_multiple_of(*count) && names.iter().zip(&names[*count..]).all(|(name, next)| name == next)
+    };
+    (2..all).find(repeats).unwrap_or(all)
 }
 
 impl Chosen {
@@ -403,6 +417,7 @@ fn signal_columns(head: TableHead<'_>, scan: &Scan, role: Role, free: &[usize]) 
         .copied()
         // A counter of messages or rows is not a motion.
         .filter(|at| !scan.columns[*at].is_constant() && !scan.columns[*at].is_counter())
+        .filter(|at| !is_other(&head.names[*at]))
         .collect();
     let of_quantity = |at: &usize| {
         let by_unit = unit_of(head, *at).map(|unit| unit.dimension);
@@ -414,12 +429,15 @@ fn signal_columns(head: TableHead<'_>, scan: &Scan, role: Role, free: &[usize]) 
     let known_otherwise = |at: &usize| {
         head.named && quantity_of(&split_name(&head.names[*at]).base).is_some_and(|q| q != role.dimension())
     };
+    let measured: Vec<usize> = named.iter().copied().filter(|at| !is_commanded(&head.names[*at])).collect();
+    let named = if measured.is_empty() { named } else { measured };
+    let is_named = !named.is_empty();
     let candidates = if named.is_empty() {
         moving.into_iter().filter(|at| !known_otherwise(at) && unit_of(head, *at).is_none()).collect()
     } else {
         named
     };
-    if let Some(parts) = components(head, scan, &candidates) {
+    if let Some(parts) = components(head, free, &candidates) {
         let variances: Vec<f64> = parts.iter().map(|at| scan.columns[*at].variance()).collect();
         let total: f64 = variances.iter().sum();
         let (main, most) = variances.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -431,25 +449,24 @@ fn signal_columns(head: TableHead<'_>, scan: &Scan, role: Role, free: &[usize]) 
     }
     let by_roughness =
         |a: &usize, b: &usize| scan.columns[*a].roughness().total_cmp(&scan.columns[*b].roughness());
-    // A motion is smooth, a force noisy.
+    let range = |at: &usize| scan.columns[*at].range() * unit_of(head, *at).map_or(1.0, |unit| unit.to_si);
+    // A motion is smooth, a force noisy; of several forces, the axial one is the largest.
     let best = match role {
         Role::Position => candidates.into_iter().min_by(by_roughness),
+        _ if is_named => candidates.into_iter().max_by(|a, b| range(a).total_cmp(&range(b))),
         _ => candidates.into_iter().max_by(by_roughness),
     };
     best.map(|at| vec![at])
 }
 
-/// Three columns of one name with x, y, z or three numbers.
-fn components(head: TableHead<'_>, scan: &Scan, candidates: &[usize]) -> Option<Vec<usize>> {
-    let stem = |at: usize| {
-        let name = split_name(&head.names[at]).base.to_lowercase();
-        let stem = name.trim_end_matches(['x', 'y', 'z', '1', '2', '3', '0']).to_owned();
-        (stem.len() + 1 == name.len()).then_some(stem)
-    };
+/// Three columns of one name with x, y, z or three numbers; of six, as of a pose or a wrench, the first three.
+fn components(head: TableHead<'_>, free: &[usize], candidates: &[usize]) -> Option<Vec<usize>> {
     candidates.iter().find_map(|first| {
-        let of = stem(*first)?;
-        let group: Vec<usize> =
-            (0..scan.columns.len()).filter(|at| stem(*at).as_ref() == Some(&of)).collect();
-        (group.len() == 3 && head.named).then_some(group)
+        let of = vector_of(&head.names[*first])?;
+        let is_part = |at: &usize| vector_of(&head.names[*at]).as_ref() == Some(&of);
+        let mut group: Vec<usize> = free.iter().copied().filter(is_part).collect();
+        let is_vector = head.named && matches!(group.len(), 3 | 6);
+        group.truncate(3);
+        is_vector.then_some(group)
     })
 }

@@ -34,10 +34,14 @@ pub(super) fn without_insertion<A: SampleStream>(
         advance_m = advance_m.max(z - lowest_m);
         last_m = z;
     })?;
+    if let Some(note) = both_reversed(recording, extent, first_m)? {
+        return Ok(Some(note));
+    }
     if advance_m <= MAX_ADVANCE_SHARE * travel_m {
         let message = format!(
             "the needle only retracts: the position falls from {first_m:.4} m to {last_m:.4} m and never advances; a recording needs the \
-             insertion; if the position runs the other way, give a column map with `scale: -1` in its `position`"
+             insertion; if the position runs the other way, reverse the sign of the scale of its `position` in a column map (`scale: -1` for metres, \
+             `scale: -0.001` for millimetres)"
         );
         let numbers = [("advance_m", advance_m), ("travel_m", travel_m)];
         return Ok(Some(QualityNote::blocking(QualityKind::OnlyRetraction, message, numbers)));
@@ -48,10 +52,56 @@ pub(super) fn without_insertion<A: SampleStream>(
     }
     let message = format!(
         "the position runs the other way: over the motion the force does {:.4} J on the needle, and a tissue takes up work; positive is into \
-         the tissue, give a column map with `scale: -1` in its `position`",
+         the tissue, reverse the sign of the scale of its `position` in a column map (`scale: -1` for metres, `scale: -0.001` for millimetres)",
         -work.net_j
     );
     let numbers = [("work_j", work.net_j), ("absolute_j", work.absolute_j)];
+    Ok(Some(QualityNote::blocking(QualityKind::ReversedPosition, message, numbers)))
+}
+
+/// Share of the travel within which a recording begins at its highest position.
+const START_SHARE: f64 = 0.1;
+/// Largest force at rest, in units of the largest fall, for a force that begins at zero.
+const MAX_REST_RATIO: f64 = 0.2;
+/// Largest mean fall over the first tenth of the way, in units of the largest one; friction of a retraction is largest at its beginning.
+const MAX_FIRST_RATIO: f64 = 0.4;
+
+/// The note on a recording whose position and force both run the other way: the needle first moves backward from its highest position, and the
+/// force falls from zero with the way. The work is then positive, as of an insertion.
+fn both_reversed<A: SampleStream>(
+    recording: &A,
+    extent: &Extent,
+    first_m: f64,
+) -> Result<Option<QualityNote>, A::Error> {
+    let ((low_m, high_m), (least_n, most_n)) = (extent.position_m, extent.force_n);
+    let (travel_m, rest_n) = (high_m - low_m, rest_n(recording)?);
+    let fall_n = rest_n - least_n;
+    if high_m - first_m > START_SHARE * travel_m
+        || fall_n <= most_n - rest_n
+        || rest_n.abs() > MAX_REST_RATIO * fall_n
+        || fall_n < MIN_FORCE_SD * noise_n(recording)?
+    {
+        return Ok(None);
+    }
+    let (mut is_first, mut sum_n, mut count) = (true, 0.0, 0.0_f64);
+    recording.for_each_block([Quantity::Position, Quantity::Force], |[position_m, force_n]| {
+        for (&z, &f) in position_m.iter().zip(force_n) {
+            is_first &= first_m - z < 0.1 * travel_m;
+            if is_first {
+                (sum_n, count) = (sum_n + rest_n - f, count + 1.0);
+            }
+        }
+    })?;
+    if sum_n > MAX_FIRST_RATIO * fall_n * count.max(1.0) {
+        return Ok(None);
+    }
+    let message = format!(
+        "position and force both run the other way: the needle first moves backward, by {:.4} m, and the force falls by {fall_n:.4} N; both should \
+         be positive in an insertion. Reverse the signs of both scales in a column map (`scale: -1` for metres and newtons, `scale: -0.001` for \
+         millimetres); a recording that begins inside the tissue needs the insertion before it",
+        first_m - low_m
+    );
+    let numbers = [("travel_m", travel_m), ("fall_n", fall_n)];
     Ok(Some(QualityNote::blocking(QualityKind::ReversedPosition, message, numbers)))
 }
 
@@ -134,6 +184,21 @@ mod tests {
             assert_eq!(
                 direction_notes(&insertion(-1.0, false, 0.0, loaded_n)?),
                 [QualityKind::OnlyRetraction]
+            );
+        }
+        Ok(())
+    }
+
+    #[test]
+    fn a_position_and_a_force_of_the_other_sign_are_refused_together() -> Result<(), RecordError> {
+        for back in [true, false] {
+            let mut mirrored = insertion(-1.0, back, 0.0, 0.0)?;
+            mirrored.force_n.iter_mut().for_each(|f| *f = -*f);
+            let notes = assess(&mirrored);
+            let found: Vec<&str> = notes.iter().filter(|n| n.blocking).map(|n| n.message.as_str()).collect();
+            assert!(
+                matches!(found[..], [message] if message.contains("position and force both")),
+                "{found:?}"
             );
         }
         Ok(())

@@ -151,7 +151,7 @@ pub(super) fn reversed_force<A: SampleStream>(recording: &A) -> Result<Option<Qu
     }
     let message = format!(
         "the force has the wrong sign: it falls by {wrong_n:.4} N while the needle advances, and should be positive when it resists \
-         the insertion; give a column map with `scale: -1` in its `force`"
+         the insertion; reverse the sign of the scale of its `force` in a column map (`scale: -1` for newtons, `scale: -1000` for kilonewtons)"
     );
     let numbers = [("wrong_n", wrong_n), ("right_n", right_n)];
     Ok(Some(QualityNote::blocking(QualityKind::Reversed, message, numbers)))

@@ -29,6 +29,7 @@ impl TextLayout {
             named: self.names_line.is_some(),
             units: &self.units,
             kinds: &self.kinds,
+            samples: &self.samples,
         }
     }
 }
@@ -147,6 +148,8 @@ fn header_first(
         names_line: Some(line),
         units_line: None,
         kinds: Vec::new(),
+        least_width: width,
+        samples: Vec::new(),
         data_start: end.min(head.len()),
         data_line: line + 1,
         preamble: Vec::new(),

@@ -1,7 +1,7 @@
 //! Layout of a text table: preamble, line of names, row of units, delimiter, decimal sign, first row of numbers.
 
 use super::delimiter::{DELIMITERS, Delimiter, split};
-use super::number::{FieldKind, Separators, classify};
+use super::number::{FieldKind, Separators, classify, parse_date_ns, parse_number};
 use super::ros;
 use crate::units::{Dimension, Unit, parse_unit, quantity_of};
 
@@ -19,6 +19,31 @@ pub enum ColumnKind {
     Empty,
 }
 
+/// Values of a column in some rows.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct ColumnSample {
+    /// Values in rows spread evenly over the text; NaN for what is no number. Seconds since 1970 for dates.
+    pub spread: Vec<f64>,
+    /// Mean step over the first rows.
+    pub step: f64,
+    /// Whether each of the first rows exceeds the one before.
+    pub increases: bool,
+}
+
+impl ColumnSample {
+    /// Largest less smallest value.
+    pub(crate) fn range(&self) -> f64 {
+        let known = || self.spread.iter().copied().filter(|x| x.is_finite());
+        (known().fold(f64::NEG_INFINITY, f64::max) - known().fold(f64::INFINITY, f64::min)).max(0.0)
+    }
+
+    /// Whether two clocks differ by more than half a step.
+    pub(crate) fn differs_as_clock(&self, other: &Self) -> bool {
+        let half = 0.5 * self.step.min(other.step).abs();
+        self.spread.iter().zip(&other.spread).any(|(a, b)| (a - b).abs() > half || a.is_nan() != b.is_nan())
+    }
+}
+
 /// Layout of a text table.
 #[derive(Debug, Clone)]
 pub(crate) struct TextLayout {
@@ -34,6 +59,9 @@ pub(crate) struct TextLayout {
     pub units: Vec<Option<Unit>>,
     pub units_line: Option<u64>,
     pub kinds: Vec<ColumnKind>,
+    /// Fewest fields of a row; the columns behind them, such as remarks, are empty in most rows.
+    pub least_width: usize,
+    pub samples: Vec<ColumnSample>,
     /// Offset and line of the first row.
     pub data_start: usize,
     pub data_line: u64,
@@ -59,6 +87,8 @@ pub(crate) struct LayoutHints {
 const MAX_LINES: usize = 3000;
 /// Rows used to find kinds of columns and the decimal sign.
 const SAMPLE_ROWS: usize = 400;
+/// Most lines between a line of units and the names below it.
+const MAX_PREAMBLE_LINES: usize = 15;
 /// Most lines between names and numbers.
 const MAX_HEADER_LINES: usize = 4;
 
@@ -130,11 +160,34 @@ fn block(lines: &[Line<'_>], delimiter: Delimiter) -> Option<Block> {
         .into_iter()
         .filter(|(width, _)| *width > 1 || delimiter == Delimiter::Blanks)
         .max_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
-    let first = rows.iter().position(|row| *row == Some(width))?;
+    let first = first_row(lines, &rows, delimiter, width)?;
     let mean = pure / count;
     // A table of one column is chosen last.
     let score = count * mean * mean * if width > 1 { 1.0 } else { 0.1 };
     Some(Block { delimiter, width, first, score })
+}
+
+/// Index of the first line with numbers in every column in which most rows have numbers. A row of a header, such as `Samples  1582  1582`,
+/// has text in one of them; a row of values may have further fields, such as a remark.
+fn first_row(
+    lines: &[Line<'_>],
+    rows: &[Option<usize>],
+    delimiter: Delimiter,
+    width: usize,
+) -> Option<usize> {
+    let is_text = |field: &String| classify(field) == FieldKind::Text;
+    let wide = |at: &usize| rows[*at].is_some_and(|row| row >= width);
+    let sample: Vec<Vec<bool>> = (0..lines.len())
+        .filter(|at| rows[*at] == Some(width))
+        .take(SAMPLE_ROWS)
+        .map(|at| split(lines[at].text, delimiter).iter().take(width).map(is_text).collect())
+        .collect();
+    let mostly_text: Vec<bool> =
+        (0..width).map(|k| 2 * sample.iter().filter(|row| row[k]).count() > sample.len()).collect();
+    (0..lines.len()).filter(wide).find(|at| {
+        let fields = split(lines[*at].text, delimiter);
+        fields.iter().zip(&mostly_text).all(|(field, text)| *text || !is_text(field))
+    })
 }
 
 /// Whether a line is a comment.
@@ -176,6 +229,8 @@ pub(crate) fn find_layout(head: &str, from: usize, from_line: u64, hints: Layout
         units: header.units,
         units_line: header.units_line,
         kinds: Vec::new(),
+        least_width: width,
+        samples: Vec::new(),
         data_start: first_row.offset,
         data_line: first_row.number,
         preamble: header.preamble,
@@ -195,8 +250,13 @@ impl TextLayout {
         let (mut numbers, mut dates, mut texts) =
             (vec![0_u32; width], vec![0_u32; width], vec![0_u32; width]);
         let (mut points, mut commas, mut open) = (0, 0, None);
+        let mut widths = vec![0_u32; width + 1];
         for line in rows.iter().take(complete.min(SAMPLE_ROWS)) {
-            for (at, field) in split(line.text, self.delimiter).iter().take(width).enumerate() {
+            let fields = split(line.text, self.delimiter);
+            if let Some(count) = widths.get_mut(fields.len().min(width)) {
+                *count += u32::from(fields.iter().any(|field| !field.is_empty()));
+            }
+            for (at, field) in fields.iter().take(width).enumerate() {
                 match classify(field) {
                     FieldKind::Number(separators) => {
                         numbers[at] += 1;
@@ -216,6 +276,13 @@ impl TextLayout {
         self.decimal_comma = hints.decimal_comma.unwrap_or(commas > 0 && commas > points);
         self.open_decimal =
             if points == 0 && commas == 0 && hints.decimal_comma.is_none() { open } else { None };
+        // Rows without the last fields are complete if most rows are like that.
+        let most = widths.iter().enumerate().skip(2).max_by_key(|(_, count)| **count);
+        self.least_width = match self.delimiter {
+            Delimiter::Byte(_) => most.map_or(width, |(fields, _)| fields.min(width)),
+            // Between blanks, the field that is missing may be any.
+            Delimiter::Blanks => width,
+        };
         self.kinds = (0..width)
             .map(|at| match (numbers[at], dates[at], texts[at]) {
                 (0, 0, 0) => ColumnKind::Empty,
@@ -224,7 +291,50 @@ impl TextLayout {
                 _ => ColumnKind::Text,
             })
             .collect();
+        self.samples = self.column_samples(head, &rows[..complete.min(SAMPLE_ROWS)]);
     }
+
+    fn column_samples(&self, head: &str, first_rows: &[Line<'_>]) -> Vec<ColumnSample> {
+        let values = |line: &str| -> Vec<f64> {
+            let fields = split(line, self.delimiter);
+            let value = |at: usize| {
+                let field = fields.get(at)?;
+                match self.kinds.get(at)? {
+                    ColumnKind::Date => parse_date_ns(field).map(|ns| ns as f64 / 1e9),
+                    _ => parse_number(field, self.decimal_comma),
+                }
+            };
+            (0..self.width()).map(|at| value(at).unwrap_or(f64::NAN)).collect()
+        };
+        let first: Vec<Vec<f64>> = first_rows.iter().map(|line| values(line.text)).collect();
+        let spread: Vec<Vec<f64>> =
+            spread_lines(&head[self.data_start.min(head.len())..]).map(values).collect();
+        let sample = |at: usize| {
+            let steps: Vec<f64> = first.windows(2).map(|pair| pair[1][at] - pair[0][at]).collect();
+            ColumnSample {
+                spread: spread.iter().map(|row| row[at]).collect(),
+                step: steps.iter().sum::<f64>() / steps.len().max(1) as f64,
+                increases: steps.iter().all(|step| *step > 0.0),
+            }
+        };
+        (0..self.width()).map(sample).collect()
+    }
+}
+
+/// Lines spread evenly over a text, without a last one that may be cut short.
+fn spread_lines(text: &str) -> impl Iterator<Item = &str> {
+    let mut from = 0;
+    (0..SAMPLE_ROWS).map_while(move |k| {
+        // The next beginning of a line; an ASCII character is no part of another one.
+        let wanted = (text.len() as u128 * k as u128 / SAMPLE_ROWS as u128) as usize;
+        if wanted > from {
+            from = wanted + text.as_bytes()[wanted..].iter().position(|b| *b == b'\n')? + 1;
+        }
+        let length = text.as_bytes()[from..].iter().position(|b| *b == b'\n')?;
+        let line = &text[from..from + length];
+        from += length + 1;
+        Some(line)
+    })
 }
 
 #[derive(Default)]
@@ -291,6 +401,21 @@ fn header(all: &[Line<'_>], first: usize, block: &Block, hints: LayoutHints) -> 
     }
     header.names_line = names_at.map(|at| all[at].number);
     let before = names_at.unwrap_or(first);
+    if header.units_line.is_none() && names_at.is_some() {
+        // A line such as `Y_Unit_Label  mm  N` further up, as LabVIEW writes it.
+        let labelled = all[..before].iter().rev().take(MAX_PREAMBLE_LINES).find_map(|line| {
+            let fields = split(line.text, block.delimiter);
+            let (label, units) = fields.split_first()?;
+            let is_label = label.to_lowercase().contains("unit") && fields.len() <= block.width + 1;
+            let known = units.iter().all(|unit| unit.is_empty() || parse_unit(unit).is_some());
+            let any = units.iter().any(|unit| !unit.is_empty());
+            (is_label && known && any).then_some((line.number, units.to_vec()))
+        });
+        if let Some((number, units)) = labelled {
+            header.units = std::iter::once(None).chain(units.iter().map(|unit| parse_unit(unit))).collect();
+            header.units_line = Some(number);
+        }
+    }
     header.preamble = all[..before]
         .iter()
         .map(|line| line.text.trim().to_owned())

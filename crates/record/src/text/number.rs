@@ -157,6 +157,9 @@ fn parse_separated(text: &str, comma: bool) -> Option<f64> {
 /// time of day `10:00:00.25`.
 pub(crate) fn parse_date_ns(text: &str) -> Option<i64> {
     let text = text.trim();
+    if let Some(ns) = parse_duration_ns(text) {
+        return Some(ns);
+    }
     if text.len() < 7 || text.len() > 40 || !text.is_ascii() || !text.as_bytes()[0].is_ascii_digit() {
         return None;
     }
@@ -188,6 +191,19 @@ pub(crate) fn parse_date_ns(text: &str) -> Option<i64> {
     }
     let of_day = hours * 3600 + minutes * 60 + whole - offset_s;
     days.checked_mul(86_400)?.checked_add(of_day)?.checked_mul(1_000_000_000)?.checked_add(nanoseconds)
+}
+
+/// Nanoseconds of a duration with its unit, `0.01 sec`, as MATLAB writes timetables.
+fn parse_duration_ns(text: &str) -> Option<i64> {
+    let (number, unit) = text.split_once(' ')?;
+    let seconds = match unit {
+        "sec" | "s" => 1.0,
+        "min" => 60.0,
+        "hr" => 3600.0,
+        _ => return None,
+    };
+    let ns = libm::round(number.parse::<f64>().ok()? * seconds * 1e9);
+    (ns.abs() < 9e18).then_some(ns as i64)
 }
 
 fn small(text: &str) -> Option<i64> {

@@ -172,11 +172,11 @@ pub(crate) fn read_rows(
         }
         let empty_end =
             row.len() == width + 1 && row.get(width).is_some_and(|field| field.trim_ascii().is_empty());
-        if row.len() != width && !empty_end {
+        if !(layout.least_width..=width).contains(&row.len()) && !empty_end {
             let this = Ragged { offset, found: row.len(), remedy: remedy_for_row(&row, layout) };
             // The last row of an interrupted log may be cut short.
             let open_quote = row.iter().any(|field| field.contains(&b'\n') || field.contains(&b'\r'));
-            if row.len() < width && read.rows >= MIN_ROWS_BEFORE_CUT && !open_quote {
+            if row.len() < layout.least_width && read.rows >= MIN_ROWS_BEFORE_CUT && !open_quote {
                 short = Some(this);
                 continue;
             }
