@@ -1,0 +1,182 @@
+//! Promise: tables as instruments and laboratory software write them are read, or refused with what to do; no column is taken silently where
+//! name and unit do not decide.
+
+use std::fmt::Write;
+use std::path::Path;
+use stylet_record::inspect::{InspectOptions, Inspection, Role, inspect_bytes};
+use stylet_record::{ReadOptions, RecordError, Recording, read_csv_bytes};
+
+const ROWS: usize = 200;
+
+/// Time (s), position (mm) and force (N) of a row.
+fn sample(k: usize) -> [f64; 3] {
+    let t = 0.01 * k as f64;
+    [t, 10.0 * t - 2.0, f64::max(0.0, 1.5 * (t - 0.2))]
+}
+
+/// A head and rows.
+fn text(head: &str, row: impl Fn(usize, [f64; 3]) -> String) -> String {
+    let mut out = head.to_owned();
+    for k in 0..ROWS {
+        let _ = writeln!(out, "{}", row(k, sample(k)));
+    }
+    out
+}
+
+fn read(text: &str, options: &ReadOptions) -> Result<Recording, RecordError> {
+    read_csv_bytes(text.as_bytes(), Path::new("log.csv"), options).map(|(recording, _)| recording)
+}
+
+fn inspected(text: &str) -> Inspection {
+    inspect_bytes(text.as_bytes(), Path::new("log.csv"), &InspectOptions::default()).expect("a table")
+}
+
+/// Reads with the map that the inspection proposes.
+fn read_as_proposed(text: &str) -> Recording {
+    let options = ReadOptions { columns: Some(inspected(text).map), repair: false };
+    read(text, &options).expect("the proposed map fits")
+}
+
+fn assert_is_the_insertion(r: &Recording) {
+    assert_eq!(r.len(), ROWS);
+    for k in 0..ROWS {
+        let [t, z, f] = sample(k);
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        assert!(near(r.time_s[k] - r.time_s[0], t), "row {k}: {}", r.time_s[k]);
+        assert!(near(r.position_m[k], 1e-3 * z) && near(r.force_n[k], f), "row {k}");
+    }
+}
+
+fn refusal(text: &str) -> String {
+    read(text, &ReadOptions::default()).expect_err("a refusal").to_string()
+}
+
+#[test]
+fn a_labview_measurement_is_read_with_the_map_of_its_inspection() {
+    let head = "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nDate\t2023/11/14\nTime\t14:03:11.12\n***End_of_Header***\t\n\t\n\
+                Channels\t2\t\t\nSamples\t200\t200\t\nDate\t2023/11/14\t2023/11/14\t\nTime\t14:03:11.12\t14:03:11.12\t\n\
+                Y_Unit_Label\tmm\tN\t\nX0\t0.0E+0\t0.0E+0\t\nDelta_X\t0.01\t0.01\t\n***End_of_Header***\t\t\t\n\
+                X_Value\tStage\tLoad cell\tComment\n";
+    let text = text(head, |_, [t, z, f]| format!("{t}\t{z}\t{f}"));
+    assert_is_the_insertion(&read_as_proposed(&text));
+}
+
+#[test]
+fn a_remark_behind_the_values_may_be_missing() {
+    let rows = |remark: &'static str| {
+        text("Time [s],Force [N],Position [mm],Event\n", move |k, [t, z, f]| {
+            if k == 0 { format!("{t},{f},{z},{remark}") } else { format!("{t},{f},{z}") }
+        })
+    };
+    for remark in ["start of the test", ""] {
+        assert_is_the_insertion(&read(&rows(remark), &ReadOptions::default()).expect("read"));
+    }
+    // A value in the middle of a recording that is cut off is no missing remark.
+    let cut = rows("").replacen("0.5,", "0.5\n0.501,", 1);
+    assert!(refusal(&cut).contains("fields"), "{}", refusal(&cut));
+}
+
+#[test]
+fn durations_with_their_unit_are_times() {
+    let text = text("Time,Position_mm,Force_N\n", |_, [t, z, f]| format!("{t} sec,{z},{f}"));
+    assert_is_the_insertion(&read(&text, &ReadOptions::default()).expect("read"));
+}
+
+#[test]
+fn of_a_date_with_whole_seconds_and_a_time_the_time_is_taken() {
+    let text = text("Date/Time;Elapsed Time (s);Load (N);Position (mm)\n", |_, [t, z, f]| {
+        format!("2023-11-14 13:59:{:02};{t};{f};{z}", t as u32)
+    });
+    assert_is_the_insertion(&read(&text, &ReadOptions::default()).expect("read"));
+}
+
+#[test]
+fn a_measured_position_is_taken_beside_its_set_point() {
+    let text = text("Time (s),Position setpoint (mm),Position (mm),Force (N)\n", |_, [t, z, f]| {
+        format!("{t},{},{z},{f}", z + 0.4)
+    });
+    assert_is_the_insertion(&read(&text, &ReadOptions::default()).expect("read"));
+}
+
+#[test]
+fn names_of_matlab_and_r_have_their_units() {
+    for head in ["Time_s_,Position_mm_,Force_N_\n", "Time..s.,Position..mm.,Force..N.\n"] {
+        let text = text(head, |_, [t, z, f]| format!("{t},{z},{f}"));
+        assert_is_the_insertion(&read(&text, &ReadOptions::default()).expect(head));
+    }
+}
+
+#[test]
+fn a_column_that_its_name_alone_does_not_decide_is_asked_for() {
+    let cases = [
+        // The robot moves along x; z rests.
+        ("t_s,x_mm,z_mm,force_n\n", ["x_mm", "z_mm"]),
+        // The clamp holds with a constant force.
+        ("t_s,Grip force (N),Depth (mm),Thrust (N)\n", ["Grip force (N)", "Thrust (N)"]),
+        ("t_s,Crosshead (mm),LVDT (mm),Force (N)\n", ["Crosshead (mm)", "LVDT (mm)"]),
+        (
+            "Zeit (s);Standardweg (mm);Traversenweg (mm);Standardkraft (N)\n",
+            ["Standardweg (mm)", "Traversenweg (mm)"],
+        ),
+    ];
+    for (head, names) in cases {
+        let text = text(head, |k, [t, z, f]| match head.as_bytes()[4] {
+            b'x' => format!("{t},{z},{},{f}", 80.0 + 1e-3 * (k % 3) as f64),
+            b'G' => format!("{t},{},{z},{f}", 8.0 + 1e-3 * (k % 3) as f64),
+            b'C' => format!("{t},{},{z},{f}", 1.02 * z),
+            _ => format!("{t};{z};{};{f}", 1.02 * z + 40.0),
+        });
+        let message = refusal(&text);
+        assert!(
+            message.contains("several columns") && names.iter().all(|n| message.contains(n)),
+            "{message}"
+        );
+    }
+    // Crosstalk in the other components of force and position decides nothing.
+    let text = text("t_s,x_mm,y_mm,z_mm,Fx_N,Fy_N,Fz_N\n", |k, [t, z, f]| {
+        let small = 1e-3 * (k % 5) as f64;
+        format!("{t},{small},{small},{z},{},{},{f}", 0.2 * f, 0.1 * f)
+    });
+    assert_is_the_insertion(&read(&text, &ReadOptions::default()).expect("read"));
+}
+
+#[test]
+fn position_and_force_with_clocks_of_their_own_are_refused_if_these_differ() {
+    let head = "Time_Force [s],Force [N],Time_Position [s],Position [mm]\n";
+    let same = text(head, |_, [t, z, f]| format!("{t},{f},{t},{z}"));
+    assert_is_the_insertion(&read(&same, &ReadOptions::default()).expect("read"));
+    let other = text(head, |_, [t, z, f]| format!("{t},{f},{},{z}", t + 0.5));
+    let message = refusal(&other);
+    assert!(message.contains("Time_Position [s]") && message.contains("file of its own"), "{message}");
+    let found = inspected(&other);
+    assert!(!found.is_readable());
+    let proposed = ReadOptions { columns: Some(found.map), repair: false };
+    assert!(read(&other, &proposed).is_err());
+}
+
+#[test]
+fn an_inspection_proposes_no_column_of_another_quantity() {
+    let text = text("time_s,position_mm,current_mA,F/T Sequence\n", |k, [t, z, f]| {
+        format!("{t},{z},{},{}", 100.0 * f + (k % 7) as f64, 4_300_000_000_u64 + k as u64)
+    });
+    let found = inspected(&text);
+    assert!(found.candidate(Role::Position).is_some() && found.candidate(Role::Force).is_none());
+    assert!(found.obstacles().any(|o| o.message.contains("no column can be the force")));
+}
+
+#[test]
+fn of_recordings_side_by_side_the_inspection_proposes_the_first() {
+    let text =
+        text("Force (N),Distance (mm),Time (sec),Force (N),Distance (mm),Time (sec)\n", |_, [t, z, f]| {
+            format!("{f},{z},{t},{},{},{t}", 2.0 * f, 3.0 * z)
+        });
+    assert_is_the_insertion(&read_as_proposed(&text));
+}
+
+#[test]
+fn of_several_forces_the_inspection_proposes_the_largest() {
+    let text = text("time_s,depth_mm,Axial force [N],Lateral force [N]\n", |k, [t, z, f]| {
+        format!("{t},{z},{f},{}", 0.05 * f + 0.02 * (k % 2) as f64)
+    });
+    assert_is_the_insertion(&read_as_proposed(&text));
+}
