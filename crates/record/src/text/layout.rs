@@ -291,7 +291,7 @@ impl TextLayout {
                 _ => ColumnKind::Text,
             })
             .collect();
-        self.samples = self.column_samples(head, &rows[..complete.min(SAMPLE_ROWS)]);
+        self.samples = self.column_samples(head, &rows[..rows.len().min(complete).min(SAMPLE_ROWS)]);
     }
 
     fn column_samples(&self, head: &str, first_rows: &[Line<'_>]) -> Vec<ColumnSample> {
