@@ -6,7 +6,7 @@ use crate::column_map::{Column, ColumnMap};
 use crate::error::RecordError;
 use crate::recording::JOINTS;
 use crate::text::layout::{ColumnKind, ColumnSample};
-use crate::units::{Dimension, Unit, is_commanded, quantity_of, split_name, vector_of};
+use crate::units::{Dimension, Unit, is_commanded, is_time, quantity_of, split_name, vector_of};
 
 /// Quantity of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -159,7 +159,10 @@ pub(crate) fn map_columns(
                 };
                 found.add(head, mapped);
             }
-            found.check_clocks(head)?;
+            // A map that names all three is right.
+            if map.time.is_open() || map.position.is_open() || map.force.is_open() {
+                found.check_clocks(head)?;
+            }
             Ok(found)
         }
     }
@@ -412,8 +415,10 @@ fn open(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Result<Mapped
         [] => Err(missing(head, own, what)),
         [first, ..] if role == ColumnRole::Time => {
             // A date with whole seconds may stand beside the time of the samples.
-            let increases = |index: &&usize| head.samples.get(**index).is_some_and(|s| s.increases);
-            Ok(mapped(head, role, vec![*found.iter().find(increases).unwrap_or(first)], &column))
+            let is_clock = |index: usize| head.samples.get(index).is_some_and(ColumnSample::is_clock);
+            let other = found.iter().find(|index| is_clock(**index));
+            let time = if is_clock(*first) { first } else { other.unwrap_or(first) };
+            Ok(mapped(head, role, vec![*time], &column))
         }
         several => Err(RecordError::SeveralColumns {
             path: head.path.to_owned(),
@@ -486,14 +491,11 @@ fn is_rival(head: TableHead<'_>, role: ColumnRole, index: usize, other: usize) -
     let vector = |index: usize| vector_of(&head.names[index]);
     let is_component = vector(index).is_some() && vector(index) == vector(other);
     let factor = if is_component && role == ColumnRole::Position { OBLIQUE_RANGE } else { RIVAL_RANGE };
-    let range = |index: usize| {
-        let scale = unit_of(head, index).map_or(1.0, |unit| unit.to_si);
-        head.samples.get(index).map_or(f64::NAN, |sample| scale * sample.range())
-    };
+    let range = |index: usize| head.samples.get(index).map_or(f64::NAN, ColumnSample::range);
     range(other) > factor * range(index)
 }
 
-/// Checks that position and force have one clock: in `t1, force, t2, position` each follows a time of its own.
+/// Checks that position and force have one clock: in `time_1, force, time_2, position` each follows a time of its own.
 ///
 /// # Errors
 /// [`RecordError::TwoClocks`].
@@ -502,25 +504,25 @@ pub(crate) fn check_clocks(
     position: &[usize],
     force: &[usize],
 ) -> Result<(), RecordError> {
-    let clock = |indices: &[usize]| -> Option<usize> {
+    let clock = |indices: &[usize]| {
         let before = indices.first()?.checked_sub(1)?;
-        let is_time = unit_of(head, before).is_some_and(|unit| unit.dimension == Dimension::Time)
-            || head.kinds.get(before) == Some(&ColumnKind::Date);
-        is_time.then_some(before)
+        let sample = head.samples.get(before).filter(|sample| sample.is_clock())?;
+        let name = head.names.get(before)?;
+        is_time(name).then_some((sample, name))
     };
-    let (Some(of_position), Some(of_force)) = (clock(position), clock(force)) else { return Ok(()) };
-    let (Some(a), Some(b)) = (head.samples.get(of_position), head.samples.get(of_force)) else {
-        return Ok(());
-    };
-    if of_position == of_force || !a.differs_as_clock(b) {
-        return Ok(());
+    match (clock(position), clock(force)) {
+        (Some((of_position, position)), Some((of_force, force)))
+            if position != force && of_position.differs_as_clock(of_force) =>
+        {
+            Err(RecordError::TwoClocks {
+                path: head.path.to_owned(),
+                line: head.line,
+                force: force.clone(),
+                position: position.clone(),
+            })
+        }
+        _ => Ok(()),
     }
-    Err(RecordError::TwoClocks {
-        path: head.path.to_owned(),
-        line: head.line,
-        force: head.names[of_force].clone(),
-        position: head.names[of_position].clone(),
-    })
 }
 
 /// Header name of the torque of a joint (0-based); names count from one.

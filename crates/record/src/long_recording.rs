@@ -192,8 +192,14 @@ impl LongRecording {
         if !is_utf8(&file_source)? {
             return Ok(None);
         }
-        let (layout, columns) =
-            find_table(head, header, file_source.line_of_row(header)?, path, options.columns.as_ref())?;
+        let (layout, columns) = find_table(
+            head,
+            header,
+            file_source.line_of_row(header)?,
+            path,
+            options.columns.as_ref(),
+            &file_source.spread_lines()?,
+        )?;
         if !is_simple(&columns, options) {
             return Ok(None);
         }

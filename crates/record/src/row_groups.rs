@@ -50,9 +50,10 @@ fn split_rows(
     by: &[String],
 ) -> Result<Vec<(String, String)>, RecordError> {
     let start = header_start(text).ok_or_else(|| RecordError::EmptyFile { path: path.to_owned() })?;
-    let line = SourceFile { text: TextSource::Bytes(text), path, header: start }.line_of_row(start)?;
+    let file = SourceFile { text: TextSource::Bytes(text), path, header: start };
+    let line = file.line_of_row(start)?;
     let text = std::str::from_utf8(text).unwrap_or_default();
-    let (layout, _) = find_table(text, start, line, path, options.columns.as_ref())?;
+    let (layout, _) = find_table(text, start, line, path, options.columns.as_ref(), &file.spread_lines()?)?;
     let place = |wanted: &String| {
         let found = layout.names.iter().position(|name| name == wanted);
         found.ok_or_else(|| missing(layout.head(path), wanted, "to split by"))

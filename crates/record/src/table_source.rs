@@ -144,7 +144,7 @@ pub(crate) fn with_text<T>(
             let mapped = map_series(layout.head(path), map, role, column)?;
             (layout, mapped)
         }
-        _ => find_table(head, header, line, path, map)?,
+        _ => find_table(head, header, line, path, map, &file.spread_lines()?)?,
     };
     let fields = wanted_fields(&layout, &mapped);
     let mut table = RawTable { columns: vec![Vec::new(); fields.len()], mapped, ..RawTable::default() };

@@ -314,6 +314,11 @@ fn has_word(name: &str, list: &[&str]) -> bool {
     })
 }
 
+/// Whether a name has a word of a time, even beside another quantity, as in `Time_Force`.
+pub(crate) fn is_time(name: &str) -> bool {
+    has_word(name, TIME_WORDS)
+}
+
 /// Whether a name denotes what is commanded, not measured.
 pub(crate) fn is_commanded(name: &str) -> bool {
     has_word(name, COMMAND_WORDS)

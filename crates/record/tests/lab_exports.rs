@@ -84,10 +84,51 @@ fn durations_with_their_unit_are_times() {
 
 #[test]
 fn of_a_date_with_whole_seconds_and_a_time_the_time_is_taken() {
-    let text = text("Date/Time;Elapsed Time (s);Load (N);Position (mm)\n", |_, [t, z, f]| {
-        format!("2023-11-14 13:59:{:02};{t};{f};{z}", t as u32)
+    for head in [
+        "Date/Time;Elapsed Time (s);Load (N);Position (mm)\n",
+        "Date/Time;Elapsed Time;Load;Position\n;s;N;mm\n",
+    ] {
+        let text = text(head, |_, [t, z, f]| format!("2023-11-14 13:59:{:02};{t};{f};{z}", t as u32));
+        assert_is_the_insertion(&read(&text, &ReadOptions::default()).expect(head));
+    }
+    // One repeated stamp is no reason for another column.
+    let rows = text("Time [s],Force [N],Position [mm],Arrival time [ms]\n", |k, [t, z, f]| {
+        format!("{},{f},{z},{}", if k == 100 { t - 0.01 } else { t }, 1e3 * t)
     });
+    assert!(refusal(&rows).contains("repeats"), "{}", refusal(&rows));
+}
+
+#[test]
+fn text_in_other_columns_of_the_first_rows_loses_no_row() {
+    for mark in ["---", "#DIV/0!", "start"] {
+        let head = "Operator;A. B.\n\nTime [s];Velocity [mm/s];Position [mm];Force [N]\n";
+        let text = text(
+            head,
+            |k, [t, z, f]| if k < 3 { format!("{t};{mark};{z};{f}") } else { format!("{t};10;{z};{f}") },
+        );
+        assert_is_the_insertion(&read(&text, &ReadOptions::default()).expect(mark));
+    }
+    // A line of numbers above the names.
+    let head = "Sample;7\n0.1;0.2;0.3;0.4;0.5;0.6\nTime [s];Position [mm];Force [N]\n";
+    let text = text(head, |_, [t, z, f]| format!("{t};{z};{f}"));
     assert_is_the_insertion(&read(&text, &ReadOptions::default()).expect("read"));
+}
+
+#[test]
+fn a_row_without_a_value_in_front_is_refused() {
+    let text = text("Index,Time [s],Position [mm],Force [N],Fx [N]\n", |_, [t, z, f]| {
+        format!("{t},{z},{f},{}", 0.1 * f)
+    });
+    assert!(refusal(&text).contains("fields"), "{}", refusal(&text));
+}
+
+#[test]
+fn a_unit_in_the_preamble_counts_less_than_one_in_a_name() {
+    for line in ["Unit;kN", "Force unit;N", "Test unit;1", "Units;ms;kN;cm"] {
+        let head = format!("{line}\n\nTime (s);Force 1 (N);Position (mm)\n");
+        let text = text(&head, |_, [t, z, f]| format!("{t};{f};{z}"));
+        assert_is_the_insertion(&read(&text, &ReadOptions::default()).expect(line));
+    }
 }
 
 #[test]
@@ -145,6 +186,14 @@ fn position_and_force_with_clocks_of_their_own_are_refused_if_these_differ() {
     let head = "Time_Force [s],Force [N],Time_Position [s],Position [mm]\n";
     let same = text(head, |_, [t, z, f]| format!("{t},{f},{t},{z}"));
     assert_is_the_insertion(&read(&same, &ReadOptions::default()).expect("read"));
+    let scaled = text("Time [s],Position [mm],Time [ms],Force [N]\n", |_, [t, z, f]| {
+        format!("{t},{z},{},{f}", 1e3 * t)
+    });
+    assert_is_the_insertion(&read(&scaled, &ReadOptions::default()).expect("read"));
+    let latency = text("time_s,position_m,latency_ms,force_n\n", |k, [t, z, f]| {
+        format!("{t},{},{},{f}", 1e-3 * z, k % 4)
+    });
+    assert_is_the_insertion(&read(&latency, &ReadOptions::default()).expect("read"));
     let other = text(head, |_, [t, z, f]| format!("{t},{f},{},{z}", t + 0.5));
     let message = refusal(&other);
     assert!(message.contains("Time_Position [s]") && message.contains("file of its own"), "{message}");

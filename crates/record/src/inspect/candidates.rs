@@ -180,6 +180,8 @@ pub(super) fn choose(head: TableHead<'_>, scan: &Scan, read: &RowsRead, map: Opt
     }
     if let Err(error) = check_clocks(head, chosen.indices(Role::Position), chosen.indices(Role::Force)) {
         chosen.errors.push((Role::Time, error));
+        // Its own time is in another file.
+        chosen.map.position = Column::default();
     }
     chosen.map_needed = !chosen.errors.is_empty();
     chosen

@@ -218,7 +218,7 @@ fn inspect_text(
     let start =
         header_start(head.as_bytes()).ok_or_else(|| RecordError::EmptyFile { path: path.to_owned() })?;
     let file = SourceFile { text, path, header: start };
-    let layout = inspect_layout(head, start, file.line_of_row(start)?, path, map)?;
+    let layout = inspect_layout(head, start, file.line_of_row(start)?, path, map, &file.spread_lines()?)?;
     let facts = FileFacts {
         path,
         format,

@@ -63,6 +63,8 @@ pub(super) fn without_insertion<A: SampleStream>(
 const START_SHARE: f64 = 0.1;
 /// Largest force at rest, in units of the largest fall, for a force that begins at zero.
 const MAX_REST_RATIO: f64 = 0.2;
+/// The first share of the way, over which friction of a retraction is already there.
+const FIRST_SHARE: f64 = 0.1;
 /// Largest mean fall over the first tenth of the way, in units of the largest one; friction of a retraction is largest at its beginning.
 const MAX_FIRST_RATIO: f64 = 0.4;
 
@@ -73,26 +75,31 @@ fn both_reversed<A: SampleStream>(
     extent: &Extent,
     first_m: f64,
 ) -> Result<Option<QualityNote>, A::Error> {
-    let ((low_m, high_m), (least_n, most_n)) = (extent.position_m, extent.force_n);
+    let (low_m, high_m) = extent.position_m;
     let (travel_m, rest_n) = (high_m - low_m, rest_n(recording)?);
-    let fall_n = rest_n - least_n;
-    if high_m - first_m > START_SHARE * travel_m
-        || fall_n <= most_n - rest_n
-        || rest_n.abs() > MAX_REST_RATIO * fall_n
-        || fall_n < MIN_FORCE_SD * noise_n(recording)?
-    {
-        return Ok(None);
-    }
-    let (mut is_first, mut sum_n, mut count) = (true, 0.0, 0.0_f64);
+    // The first stroke backward ends where the position has risen again.
+    let (mut before_m, mut lowest_m, mut in_stroke) = (first_m, first_m, true);
+    let (mut fall_n, mut rise_n, mut first_work_j) = (0.0_f64, 0.0_f64, 0.0);
     recording.for_each_block([Quantity::Position, Quantity::Force], |[position_m, force_n]| {
         for (&z, &f) in position_m.iter().zip(force_n) {
-            is_first &= first_m - z < 0.1 * travel_m;
-            if is_first {
-                (sum_n, count) = (sum_n + rest_n - f, count + 1.0);
+            lowest_m = lowest_m.min(z);
+            in_stroke &= z - lowest_m < START_SHARE * travel_m;
+            if in_stroke {
+                fall_n = fall_n.max(rest_n - f);
+                rise_n = rise_n.max(f - rest_n);
+                if first_m - lowest_m < FIRST_SHARE * travel_m {
+                    first_work_j += (rest_n - f) * (before_m - z);
+                }
+                before_m = z;
             }
         }
     })?;
-    if sum_n > MAX_FIRST_RATIO * fall_n * count.max(1.0) {
+    if high_m - first_m > START_SHARE * travel_m
+        || fall_n <= rise_n
+        || rest_n.abs() > MAX_REST_RATIO * fall_n
+        || fall_n < MIN_FORCE_SD * noise_n(recording)?
+        || first_work_j > MAX_FIRST_RATIO * fall_n * FIRST_SHARE * travel_m
+    {
         return Ok(None);
     }
     let message = format!(

@@ -36,7 +36,8 @@ impl TextLayout {
 
 /// The layout of a text from its head, in which the first line that is not blank begins at `start`, on `line`.
 ///
-/// The first line is the header when it has the columns that are wanted; otherwise the rows of numbers decide.
+/// The first line is the header when it has the columns that are wanted; otherwise the rows of numbers decide. `spread` are lines spread over the
+/// text ([`SourceFile::spread_lines`](super::source::SourceFile::spread_lines)), which show how much each column varies.
 ///
 /// # Errors
 /// Those of [`map_columns`]; [`RecordError::NoTable`] without rows of numbers.
@@ -46,6 +47,7 @@ pub(crate) fn find_table(
     line: u64,
     path: &Path,
     map: Option<&ColumnMap>,
+    spread: &[String],
 ) -> Result<(TextLayout, MappedColumns), RecordError> {
     let by_number = map.is_some_and(|map| {
         [&map.time, &map.position, &map.force].iter().any(|c| c.column.is_some() || !c.columns.is_empty())
@@ -59,13 +61,19 @@ pub(crate) fn find_table(
                 continue;
             }
             match map_columns(layout.head(path), map) {
-                Ok(columns) => return Ok((layout, columns)),
+                Ok(_) => {
+                    // The values may tell more than the names.
+                    let layout = layout.with_samples(head, spread);
+                    let columns = map_columns(layout.head(path), map)?;
+                    return Ok((layout, columns));
+                }
                 Err(error) => first_error = first_error.or(Some(error)),
             }
         }
     }
     match find_layout(head, start, line, hints) {
         Some(layout) => {
+            let layout = layout.with_samples(head, spread);
             let columns = map_columns(layout.head(path), map)?;
             if let Some(text) = &layout.open_decimal {
                 return Err(RecordError::OpenDecimal {
@@ -91,10 +99,14 @@ pub(crate) fn inspect_layout(
     line: u64,
     path: &Path,
     map: Option<&ColumnMap>,
+    spread: &[String],
 ) -> Result<TextLayout, RecordError> {
-    match find_table(head, start, line, path, map) {
+    match find_table(head, start, line, path, map, spread) {
         Ok((layout, _)) => Ok(layout),
-        Err(error) => find_layout(head, start, line, LayoutHints::new(map)).ok_or(error),
+        Err(error) => match find_layout(head, start, line, LayoutHints::new(map)) {
+            Some(layout) => Ok(layout.with_samples(head, spread)),
+            None => Err(error),
+        },
     }
 }
 

@@ -3,7 +3,7 @@
 use super::delimiter::{DELIMITERS, Delimiter, split};
 use super::number::{FieldKind, Separators, classify, parse_date_ns, parse_number};
 use super::ros;
-use crate::units::{Dimension, Unit, parse_unit, quantity_of};
+use crate::units::{Dimension, Unit, parse_unit, quantity_of, split_name};
 
 /// Contents of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -19,16 +19,20 @@ pub enum ColumnKind {
     Empty,
 }
 
-/// Values of a column in some rows.
+/// Values of a column in some rows; of columns with times, lengths and forces only.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ColumnSample {
-    /// Values in rows spread evenly over the text; NaN for what is no number. Seconds since 1970 for dates.
+    /// Values in rows spread evenly over the text, in SI units; NaN for what is no number. Seconds since 1970 for dates.
     pub spread: Vec<f64>,
     /// Mean step over the first rows.
     pub step: f64,
-    /// Whether each of the first rows exceeds the one before.
-    pub increases: bool,
+    /// Share of the first rows that exceed the one before.
+    pub rising_share: f64,
+    pub is_date: bool,
 }
+
+/// Share of rising steps of a clock; the others repeat a stamp.
+const CLOCK_SHARE: f64 = 0.9;
 
 impl ColumnSample {
     /// Largest less smallest value.
@@ -37,10 +41,19 @@ impl ColumnSample {
         (known().fold(f64::NEG_INFINITY, f64::max) - known().fold(f64::INFINITY, f64::min)).max(0.0)
     }
 
-    /// Whether two clocks differ by more than half a step.
+    /// Whether every sample has a stamp of its own, with few exceptions.
+    pub(crate) fn is_clock(&self) -> bool {
+        self.rising_share >= CLOCK_SHARE
+    }
+
+    /// Whether two clocks differ by more than half a step; only in elapsed time if one of them is a date.
     pub(crate) fn differs_as_clock(&self, other: &Self) -> bool {
-        let half = 0.5 * self.step.min(other.step).abs();
-        self.spread.iter().zip(&other.spread).any(|(a, b)| (a - b).abs() > half || a.is_nan() != b.is_nan())
+        let start = |sample: &Self| match self.is_date || other.is_date {
+            true => sample.spread.iter().copied().find(|x| x.is_finite()).unwrap_or(0.0),
+            false => 0.0,
+        };
+        let (half, shift) = (0.5 * self.step.min(other.step).abs(), start(self) - start(other));
+        self.spread.iter().zip(&other.spread).any(|(a, b)| (a - b - shift).abs() > half)
     }
 }
 
@@ -167,8 +180,8 @@ fn block(lines: &[Line<'_>], delimiter: Delimiter) -> Option<Block> {
     Some(Block { delimiter, width, first, score })
 }
 
-/// Index of the first line with numbers in every column in which most rows have numbers. A row of a header, such as `Samples  1582  1582`,
-/// has text in one of them; a row of values may have further fields, such as a remark.
+/// Index of the first row. A row of a header, such as `Samples  1582  1582`, has text in the first column where most rows have numbers; a row
+/// of values may have remarks behind them.
 fn first_row(
     lines: &[Line<'_>],
     rows: &[Option<usize>],
@@ -176,18 +189,17 @@ fn first_row(
     width: usize,
 ) -> Option<usize> {
     let is_text = |field: &String| classify(field) == FieldKind::Text;
-    let wide = |at: &usize| rows[*at].is_some_and(|row| row >= width);
-    let sample: Vec<Vec<bool>> = (0..lines.len())
-        .filter(|at| rows[*at] == Some(width))
-        .take(SAMPLE_ROWS)
-        .map(|at| split(lines[at].text, delimiter).iter().take(width).map(is_text).collect())
-        .collect();
-    let mostly_text: Vec<bool> =
-        (0..width).map(|k| 2 * sample.iter().filter(|row| row[k]).count() > sample.len()).collect();
-    (0..lines.len()).filter(wide).find(|at| {
-        let fields = split(lines[*at].text, delimiter);
-        fields.iter().zip(&mostly_text).all(|(field, text)| *text || !is_text(field))
-    })
+    let first_is_text = |at: &usize| split(lines[*at].text, delimiter).first().is_some_and(is_text);
+    let of_width = || (0..lines.len()).filter(|at| rows[*at] == Some(width));
+    let texts = of_width().take(SAMPLE_ROWS).filter(first_is_text).count();
+    let mostly_text = 2 * texts > of_width().take(SAMPLE_ROWS).count();
+    let is_row = |at: &usize| {
+        let remarks = |fields: &[String]| fields.iter().skip(width).all(|f| f.is_empty() || is_text(f));
+        rows[*at].is_some_and(|row| row >= width)
+            && (mostly_text || !first_is_text(at))
+            && (rows[*at] == Some(width) || remarks(&split(lines[*at].text, delimiter)))
+    };
+    (0..lines.len()).find(is_row).or_else(|| of_width().next())
 }
 
 /// Whether a line is a comment.
@@ -250,13 +262,8 @@ impl TextLayout {
         let (mut numbers, mut dates, mut texts) =
             (vec![0_u32; width], vec![0_u32; width], vec![0_u32; width]);
         let (mut points, mut commas, mut open) = (0, 0, None);
-        let mut widths = vec![0_u32; width + 1];
         for line in rows.iter().take(complete.min(SAMPLE_ROWS)) {
-            let fields = split(line.text, self.delimiter);
-            if let Some(count) = widths.get_mut(fields.len().min(width)) {
-                *count += u32::from(fields.iter().any(|field| !field.is_empty()));
-            }
-            for (at, field) in fields.iter().take(width).enumerate() {
+            for (at, field) in split(line.text, self.delimiter).iter().take(width).enumerate() {
                 match classify(field) {
                     FieldKind::Number(separators) => {
                         numbers[at] += 1;
@@ -276,13 +283,6 @@ impl TextLayout {
         self.decimal_comma = hints.decimal_comma.unwrap_or(commas > 0 && commas > points);
         self.open_decimal =
             if points == 0 && commas == 0 && hints.decimal_comma.is_none() { open } else { None };
-        // Rows without the last fields are complete if most rows are like that.
-        let most = widths.iter().enumerate().skip(2).max_by_key(|(_, count)| **count);
-        self.least_width = match self.delimiter {
-            Delimiter::Byte(_) => most.map_or(width, |(fields, _)| fields.min(width)),
-            // Between blanks, the field that is missing may be any.
-            Delimiter::Blanks => width,
-        };
         self.kinds = (0..width)
             .map(|at| match (numbers[at], dates[at], texts[at]) {
                 (0, 0, 0) => ColumnKind::Empty,
@@ -291,50 +291,68 @@ impl TextLayout {
                 _ => ColumnKind::Text,
             })
             .collect();
-        self.samples = self.column_samples(head, &rows[..rows.len().min(complete).min(SAMPLE_ROWS)]);
+        // Remarks behind the values may be missing. Between blanks, the field that is missing may be any.
+        let is_remark = |at: usize| {
+            matches!(self.kinds[at], ColumnKind::Text | ColumnKind::Empty)
+                && self.unit(at).is_none()
+                && quantity_of(&split_name(&self.names[at]).base).is_none()
+        };
+        let remarks = (2..width).rev().take_while(|at| is_remark(*at)).count();
+        self.least_width = if self.delimiter == Delimiter::Blanks { width } else { width - remarks };
     }
 
-    fn column_samples(&self, head: &str, first_rows: &[Line<'_>]) -> Vec<ColumnSample> {
+    fn unit(&self, at: usize) -> Option<Unit> {
+        self.units.get(at).copied().flatten().or_else(|| split_name(self.names.get(at)?).unit)
+    }
+
+    /// The layout with values of the columns in the first rows and in `spread`, lines spread over the text.
+    pub(crate) fn with_samples(mut self, head: &str, spread: &[String]) -> Self {
+        let rows = lines(head, self.data_start, self.data_line);
+        let is_row = |line: &&Line<'_>| !line.text.trim().is_empty() && !is_comment(line.text);
+        let first: Vec<&str> = rows.iter().filter(is_row).map(|line| line.text).take(SAMPLE_ROWS).collect();
+        // The last of them may be cut short.
+        self.samples = self.column_samples(&first[..first.len().saturating_sub(1)], spread);
+        self
+    }
+
+    fn column_samples(&self, first_rows: &[&str], spread: &[String]) -> Vec<ColumnSample> {
+        let scale = |at: usize| match (self.kinds.get(at), self.unit(at)) {
+            (Some(ColumnKind::Date), _) => Some(1.0),
+            (_, Some(unit)) => {
+                matches!(unit.dimension, Dimension::Time | Dimension::Length | Dimension::Force)
+                    .then_some(unit.to_si)
+            }
+            _ => None,
+        };
+        let scales: Vec<Option<f64>> = (0..self.width()).map(scale).collect();
         let values = |line: &str| -> Vec<f64> {
             let fields = split(line, self.delimiter);
             let value = |at: usize| {
-                let field = fields.get(at)?;
+                let (scale, field) = (scales[at]?, fields.get(at)?);
                 match self.kinds.get(at)? {
                     ColumnKind::Date => parse_date_ns(field).map(|ns| ns as f64 / 1e9),
-                    _ => parse_number(field, self.decimal_comma),
+                    _ => parse_number(field, self.decimal_comma).map(|x| scale * x),
                 }
             };
             (0..self.width()).map(|at| value(at).unwrap_or(f64::NAN)).collect()
         };
-        let first: Vec<Vec<f64>> = first_rows.iter().map(|line| values(line.text)).collect();
-        let spread: Vec<Vec<f64>> =
-            spread_lines(&head[self.data_start.min(head.len())..]).map(values).collect();
+        let first: Vec<Vec<f64>> = first_rows.iter().map(|line| values(line)).collect();
+        let spread: Vec<Vec<f64>> = spread.iter().map(|line| values(line)).collect();
         let sample = |at: usize| {
+            if scales[at].is_none() {
+                return ColumnSample::default();
+            }
             let steps: Vec<f64> = first.windows(2).map(|pair| pair[1][at] - pair[0][at]).collect();
+            let count = steps.iter().filter(|step| step.is_finite()).count().max(1) as f64;
             ColumnSample {
                 spread: spread.iter().map(|row| row[at]).collect(),
-                step: steps.iter().sum::<f64>() / steps.len().max(1) as f64,
-                increases: steps.iter().all(|step| *step > 0.0),
+                step: steps.iter().filter(|step| step.is_finite()).sum::<f64>() / count,
+                rising_share: steps.iter().filter(|step| **step > 0.0).count() as f64 / count,
+                is_date: self.kinds.get(at) == Some(&ColumnKind::Date),
             }
         };
         (0..self.width()).map(sample).collect()
     }
-}
-
-/// Lines spread evenly over a text, without a last one that may be cut short.
-fn spread_lines(text: &str) -> impl Iterator<Item = &str> {
-    let mut from = 0;
-    (0..SAMPLE_ROWS).map_while(move |k| {
-        // The next beginning of a line; an ASCII character is no part of another one.
-        let wanted = (text.len() as u128 * k as u128 / SAMPLE_ROWS as u128) as usize;
-        if wanted > from {
-            from = wanted + text.as_bytes()[wanted..].iter().position(|b| *b == b'\n')? + 1;
-        }
-        let length = text.as_bytes()[from..].iter().position(|b| *b == b'\n')?;
-        let line = &text[from..from + length];
-        from += length + 1;
-        Some(line)
-    })
 }
 
 #[derive(Default)]
@@ -402,17 +420,27 @@ fn header(all: &[Line<'_>], first: usize, block: &Block, hints: LayoutHints) -> 
     header.names_line = names_at.map(|at| all[at].number);
     let before = names_at.unwrap_or(first);
     if header.units_line.is_none() && names_at.is_some() {
-        // A line such as `Y_Unit_Label  mm  N` further up, as LabVIEW writes it.
+        // A line such as `Y_Unit_Label  mm  N` further up, as LabVIEW writes it: a label in place of the first unit, or before it.
+        let names = header.names.as_deref().unwrap_or_default();
         let labelled = all[..before].iter().rev().take(MAX_PREAMBLE_LINES).find_map(|line| {
-            let fields = split(line.text, block.delimiter);
-            let (label, units) = fields.split_first()?;
-            let is_label = label.to_lowercase().contains("unit") && fields.len() <= block.width + 1;
-            let known = units.iter().all(|unit| unit.is_empty() || parse_unit(unit).is_some());
-            let any = units.iter().any(|unit| !unit.is_empty());
-            (is_label && known && any).then_some((line.number, units.to_vec()))
+            let mut fields = split(line.text, block.delimiter);
+            while fields.last().is_some_and(String::is_empty) {
+                fields.pop();
+            }
+            let is_label = fields.first()?.to_lowercase().contains("unit");
+            let from = fields.len().checked_sub(block.width)?;
+            let mut units: Vec<Option<Unit>> = fields.iter().map(|field| parse_unit(field)).collect();
+            units[0] = None;
+            let known =
+                fields.iter().zip(&units).skip(1).all(|(field, unit)| field.is_empty() || unit.is_some());
+            let real = units.iter().flatten().filter(|unit| unit.dimension != Dimension::Other).count();
+            (is_label && known && real > 1 && from < 2).then(|| (line.number, units.split_off(from)))
         });
         if let Some((number, units)) = labelled {
-            header.units = std::iter::once(None).chain(units.iter().map(|unit| parse_unit(unit))).collect();
+            // A unit in the name of the column counts more.
+            let in_name = |at: usize| names.get(at).is_some_and(|name| split_name(name).unit.is_some());
+            header.units =
+                units.into_iter().enumerate().map(|(at, unit)| unit.filter(|_| !in_name(at))).collect();
             header.units_line = Some(number);
         }
     }

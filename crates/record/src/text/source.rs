@@ -1,7 +1,7 @@
 //! Texts that are read in several passes, and their line numbers.
 
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use encoding_rs::Encoding;
@@ -11,6 +11,8 @@ use crate::error::RecordError;
 
 /// Size of a read in bytes.
 pub(crate) const CHUNK_BYTES: usize = 1 << 16;
+/// Fewest lines of [`SourceFile::spread_lines`] of a long text.
+const SPREAD_LINES: usize = 256;
 
 /// Offset of the header line: the first line that is not blank, after a byte order mark.
 pub(crate) fn header_start(bytes: &[u8]) -> Option<usize> {
@@ -103,6 +105,42 @@ impl SourceFile<'_> {
         match failed {
             Some(why) => Err(self.unreadable(why)),
             None => Ok(lines),
+        }
+    }
+
+    /// Lines spread evenly over the text from the header on: every line, every second one, every fourth one, ..., up to twice [`SPREAD_LINES`].
+    pub(crate) fn spread_lines(&self) -> Result<Vec<String>, RecordError> {
+        let from = self.text.reader_at(self.header).map_err(|source| self.unreadable(source))?;
+        let mut text = BufReader::with_capacity(CHUNK_BYTES, from);
+        let (mut lines, mut line, mut is_blank) = (Vec::new(), Vec::new(), true);
+        let (mut number, mut stride) = (0_usize, 1);
+        loop {
+            let chunk = text.fill_buf().map_err(|source| self.unreadable(source))?;
+            let end = chunk.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+            let (count, is_last) = (end.unwrap_or(chunk.len()), chunk.is_empty());
+            let is_kept = number.is_multiple_of(stride);
+            if is_kept && line.len() < CHUNK_BYTES {
+                line.extend_from_slice(&chunk[..count]);
+            }
+            is_blank &= count == 0;
+            text.consume(count + usize::from(end.is_some()));
+            if end.is_none() && !is_last {
+                continue;
+            }
+            if is_kept && !is_blank {
+                lines.push(String::from_utf8_lossy(&line).into_owned());
+            }
+            // A line end of two characters gives an empty line, which is not counted.
+            number += usize::from(!is_blank);
+            line.clear();
+            is_blank = true;
+            if lines.len() == 2 * SPREAD_LINES {
+                lines = lines.into_iter().step_by(2).collect();
+                stride *= 2;
+            }
+            if is_last {
+                return Ok(lines);
+            }
         }
     }
 
