@@ -47,14 +47,14 @@ pub(crate) fn assemble(
     raw: RawTable,
     options: &ReadOptions,
 ) -> Result<(Recording, Vec<QualityNote>), RecordError> {
-    let cut_row = raw.read.cut_row;
+    let left_out = raw.read.left_out;
     let mut table = Table::new(file, raw, options)?;
-    if let Some(offset) = cut_row {
-        let line = file.line_of_row(offset)?;
-        let message = format!("the last row, on line {line}, is cut short and was left out");
+    if let Some(left_out) = left_out {
+        let line = file.line_of_row(left_out.offset)?;
+        let numbers = [("dropped", left_out.lines as f64)];
         table.notes.push(QualityNote {
             lines: vec![line],
-            ..QualityNote::new(QualityKind::RepairedRows, message, [("dropped", 1.0)])
+            ..QualityNote::new(QualityKind::RepairedRows, left_out.message(line), numbers)
         });
     }
     table.order(file, options.repair)?;

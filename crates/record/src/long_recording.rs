@@ -242,7 +242,7 @@ impl LongRecording {
         if odd_clock
             || (!in_order && !options.repair)
             || holes as f64 > MAX_HOLE_SHARE * read.rows as f64
-            || read.cut_row.is_some()
+            || read.left_out.is_some()
         {
             return Ok(None);
         }

@@ -229,3 +229,35 @@ fn of_several_forces_the_inspection_proposes_the_largest() {
     });
     assert_is_the_insertion(&read_as_proposed(&text));
 }
+
+#[test]
+fn statistics_at_the_end_are_left_out_with_a_note() {
+    let rows = text("Zeit (s);Weg (mm);Kraft (N)\n", |_, [t, z, f]| format!("{t};{z};{f}"));
+    for end in ["\nMaximum;22,004;2,066\nMittelwert;;0,486\n", "END OF DATA\n", "Maximum;1\n"] {
+        let (recording, notes) =
+            read_csv_bytes(format!("{rows}{end}").as_bytes(), Path::new("log.csv"), &ReadOptions::default())
+                .expect(end);
+        assert_is_the_insertion(&recording);
+        assert!(
+            notes.iter().any(|n| n.message.contains("at the end")
+                && n.lines == [if end.starts_with('\n') { 203 } else { 202 }]),
+            "{notes:?}"
+        );
+    }
+    // Text between rows is refused, and so is a text of many lines.
+    let between = rows.replacen("\n0.5;", "\npause;;\n0.5;", 1);
+    assert!(refusal(&between).contains("\"pause\" is not a number"), "{}", refusal(&between));
+    let many = format!("{rows}{}", "off;;\n".repeat(60));
+    assert!(refusal(&many).contains("\"off\" is not a number"), "{}", refusal(&many));
+}
+
+#[test]
+fn marks_of_meters_and_spreadsheets_are_missing_values() {
+    for mark in ["---", "OL", "#DIV/0!", "#NV"] {
+        let text = text("Time [s],Position [mm],Force [N]\n", |k, [t, z, f]| match k {
+            50 => format!("{t},{z},{mark}"),
+            _ => format!("{t},{z},{f}"),
+        });
+        assert_eq!(read(&text, &ReadOptions::default()).expect(mark).len(), ROWS - 1);
+    }
+}

@@ -140,9 +140,9 @@ fn rows_and_values(
         let more = if *count > 1 { format!(" ({count} such rows)") } else { String::new() };
         found.obstacle("layout", Some(*line), without_path(error, found.path) + &more);
     }
-    if let Some(offset) = read.cut_row {
-        let line = rows.lines(&[offset])?.first().copied().unwrap_or(1);
-        found.remark("layout", format!("line {line}: the last row is cut short and is left out"));
+    if let Some(left_out) = read.left_out {
+        let line = rows.lines(&[left_out.offset])?.first().copied().unwrap_or(1);
+        found.remark("layout", left_out.message(line));
     }
     if sampling.is_some_and(|s| s.alternating) {
         found.remark("values", "rows of different topics alternate: the position is interpolated on the time stamps of the force".to_owned());

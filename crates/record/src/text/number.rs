@@ -7,7 +7,7 @@ pub(crate) enum FieldKind {
     Number(Separators),
     /// A date or a time of day.
     Date,
-    /// No value: empty, `nan`, `NA`, `null`, `-`.
+    /// No value: empty, `nan`, `NA`, `null`, `-`, an error of a spreadsheet, an overload of a meter.
     Missing,
     /// Anything else.
     Text,
@@ -28,7 +28,7 @@ pub(crate) enum Separators {
 
 /// Whether a field has no value. Infinite values count as missing: no sensor gives them.
 pub(crate) fn is_missing(text: &str) -> bool {
-    const WORDS: [&str; 15] = [
+    const WORDS: [&str; 22] = [
         "nan",
         "na",
         "n/a",
@@ -43,6 +43,13 @@ pub(crate) fn is_missing(text: &str) -> bool {
         "-infinity",
         "+infinity",
         "#n/a",
+        "#nv",
+        "#num!",
+        "#div/0!",
+        "#value!",
+        "ol",
+        "ovl",
+        "---",
         "-nan",
     ];
     text.is_empty() || (text.len() <= 9 && WORDS.iter().any(|word| text.eq_ignore_ascii_case(word)))

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Read};
 
 use super::delimiter::{Delimiter, split};
 use super::layout::{ColumnKind, TextLayout};
-use super::number::{is_missing, parse_date_ns, parse_number};
+use super::number::{FieldKind, classify, is_missing, parse_date_ns, parse_number};
 use super::source::{CHUNK_BYTES, SourceFile};
 use crate::error::RecordError;
 
@@ -34,14 +34,33 @@ pub(crate) struct MissingValue {
 pub(crate) struct RowsRead {
     pub rows: usize,
     pub first_missing: Option<MissingValue>,
-    /// Offset of a last row that is cut short.
-    pub cut_row: Option<usize>,
+    /// Lines at the end that are left out.
+    pub left_out: Option<LeftOut>,
     /// Fields that are not numbers, by column; only with [`Tolerance::Lenient`].
     pub bad_values: Vec<BadValues>,
     /// Rows with another number of fields: how many, the line and the error of the first; only with [`Tolerance::Lenient`].
     pub ragged: Option<(usize, u64, std::sync::Arc<RecordError>)>,
     /// First values, of dates (ns since 1970) and large integers, from which others are counted.
     pub origins: Vec<Option<i64>>,
+}
+
+/// Lines at the end of a file that are no rows: a last row that is cut short, or text such as the statistics of a testing machine.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct LeftOut {
+    /// Offset of the first.
+    pub offset: usize,
+    pub lines: usize,
+    pub is_text: bool,
+}
+
+impl LeftOut {
+    /// What was left out, from this line on.
+    pub(crate) fn message(self, line: u64) -> String {
+        match self.is_text {
+            true => format!("{} line(s) of text at the end, from line {line} on, are left out", self.lines),
+            false => format!("the last row, on line {line}, is cut short and is left out"),
+        }
+    }
 }
 
 /// Fields of a column that are not numbers.
@@ -68,6 +87,8 @@ pub(crate) enum Tolerance {
 const LARGE_DIGITS: usize = 16;
 /// Fewest rows before a truncated last row for leaving it out.
 const MIN_ROWS_BEFORE_CUT: usize = 3;
+/// Most lines of text at the end of a file.
+const MAX_TEXT_LINES: usize = 50;
 
 /// Records with one delimiter.
 enum Records<'a> {
@@ -145,9 +166,9 @@ pub(crate) fn read_rows(
     let mut numbers = vec![0.0; wanted.len()];
     let mut read = RowsRead { origins: vec![None; wanted.len()], ..RowsRead::default() };
     // Errors about skipped lines are created at the end, because finding a line number reads the file from its beginning.
-    let mut short: Option<Ragged> = None;
+    let mut tail: Option<(LeftOut, Skipped)> = None;
     let mut ragged: Option<(usize, Ragged)> = None;
-    let mut bad: Vec<(usize, usize, MissingValue)> = Vec::new();
+    let mut bad: BadFields = Vec::new();
     loop {
         let offset = layout.data_start + usize::try_from(records.offset()).unwrap_or(usize::MAX / 2);
         match records.read(&mut row, layout.comment) {
@@ -164,20 +185,51 @@ pub(crate) fn read_rows(
         if row.iter().all(|field| field.trim_ascii().is_empty()) {
             continue;
         }
-        if let Some(short) = short.take() {
-            match tolerance {
-                Tolerance::Strict => return Err(short.error(file, layout)?),
-                Tolerance::Lenient => ragged.get_or_insert((0, short)).0 += 1,
-            }
-        }
         let empty_end =
             row.len() == width + 1 && row.get(width).is_some_and(|field| field.trim_ascii().is_empty());
-        if !(layout.least_width..=width).contains(&row.len()) && !empty_end {
+        let is_ragged = !(layout.least_width..=width).contains(&row.len()) && !empty_end;
+        let mut failed = None;
+        if !is_ragged {
+            for (at, field) in wanted.iter().enumerate() {
+                let bytes = row.get(field.index).unwrap_or_default();
+                match value(layout, field, bytes, &mut read.origins[at]) {
+                    Some(value) => numbers[at] = value,
+                    None => {
+                        failed = Some(at);
+                        break;
+                    }
+                }
+            }
+        }
+        let open_quote = || row.iter().any(|field| field.contains(&b'\n') || field.contains(&b'\r'));
+        let may_end = (is_ragged || failed.is_some()) && read.rows >= MIN_ROWS_BEFORE_CUT && !open_quote();
+        let is_text = may_end && begins_with_text(&row, layout);
+        match &mut tail {
+            Some((left_out, _)) if is_text && left_out.is_text && left_out.lines < MAX_TEXT_LINES => {
+                left_out.lines += 1;
+                continue;
+            }
+            Some(_) => {
+                let skipped = tail.take().map(|(_, skipped)| skipped);
+                match (skipped, tolerance) {
+                    (Some(skipped), Tolerance::Strict) => return Err(skipped.error(file, layout, wanted)?),
+                    (Some(Skipped::Ragged(this)), _) => ragged.get_or_insert((0, this)).0 += 1,
+                    (Some(Skipped::Value(this)), _) => count_bad(&mut bad, this),
+                    (None, _) => {}
+                }
+            }
+            None => {}
+        }
+        if let (Some(at), true) = (failed, is_text) {
+            let skipped =
+                Skipped::Value(MissingValue { offset, field: at, text: field_text(&row, &wanted[at]) });
+            tail = Some((LeftOut { offset, lines: 1, is_text }, skipped));
+            continue;
+        }
+        if is_ragged {
             let this = Ragged { offset, found: row.len(), remedy: remedy_for_row(&row, layout) };
-            // The last row of an interrupted log may be cut short.
-            let open_quote = row.iter().any(|field| field.contains(&b'\n') || field.contains(&b'\r'));
-            if row.len() < layout.least_width && read.rows >= MIN_ROWS_BEFORE_CUT && !open_quote {
-                short = Some(this);
+            if is_text || (row.len() < layout.least_width && may_end) {
+                tail = Some((LeftOut { offset, lines: 1, is_text }, Skipped::Ragged(this)));
                 continue;
             }
             match tolerance {
@@ -187,30 +239,33 @@ pub(crate) fn read_rows(
             continue;
         }
         for (at, field) in wanted.iter().enumerate() {
-            let bytes = row.get(field.index).unwrap_or_default();
-            let text = || String::from_utf8_lossy(bytes).trim().to_owned();
-            numbers[at] = match value(layout, field, bytes, &mut read.origins[at]) {
-                Some(value) => value,
-                None if tolerance == Tolerance::Strict => {
-                    return Err(not_a_number(file, layout, offset, field, text())?);
-                }
-                None => {
-                    match bad.iter_mut().find(|(field, ..)| *field == at) {
-                        Some((_, count, _)) => *count += 1,
-                        None => bad.push((at, 1, MissingValue { offset, field: at, text: text() })),
+            if failed.is_some_and(|first| at >= first) {
+                let bytes = row.get(field.index).unwrap_or_default();
+                let text = || field_text(&row, field);
+                numbers[at] = match value(layout, field, bytes, &mut read.origins[at]) {
+                    Some(value) => value,
+                    None if tolerance == Tolerance::Strict => {
+                        return Err(not_a_number(file, layout, offset, field, text())?);
                     }
-                    f64::NAN
-                }
-            };
+                    None => {
+                        count_bad(&mut bad, MissingValue { offset, field: at, text: text() });
+                        f64::NAN
+                    }
+                };
+            }
             if !numbers[at].is_finite() {
                 numbers[at] = f64::NAN;
-                read.first_missing.get_or_insert_with(|| MissingValue { offset, field: at, text: text() });
+                read.first_missing.get_or_insert_with(|| MissingValue {
+                    offset,
+                    field: at,
+                    text: field_text(&row, field),
+                });
             }
         }
         read.rows += 1;
         each(offset, &numbers)?;
     }
-    read.cut_row = short.map(|short| short.offset);
+    read.left_out = tail.map(|(left_out, _)| left_out);
     if let Some((count, first)) = ragged {
         let line = file.line_of_row(first.offset)?;
         read.ragged = Some((count, line, first.error(file, layout)?.into()));
@@ -225,6 +280,49 @@ pub(crate) fn read_rows(
         return Err(RecordError::HeaderOnly { path: file.path(), line });
     }
     Ok(read)
+}
+
+/// Fields that are not numbers: the wanted field, how many, and the first of them.
+type BadFields = Vec<(usize, usize, MissingValue)>;
+
+fn count_bad(bad: &mut BadFields, value: MissingValue) {
+    match bad.iter_mut().find(|(field, ..)| *field == value.field) {
+        Some((_, count, _)) => *count += 1,
+        None => bad.push((value.field, 1, value)),
+    }
+}
+
+fn field_text(row: &csv::ByteRecord, field: &WantedField) -> String {
+    String::from_utf8_lossy(row.get(field.index).unwrap_or_default()).trim().to_owned()
+}
+
+/// Whether the first field that is not empty is text in a column of numbers.
+fn begins_with_text(row: &csv::ByteRecord, layout: &TextLayout) -> bool {
+    let fields = row.iter().zip(&layout.kinds).filter(|(field, _)| !field.trim_ascii().is_empty());
+    let first = fields.map(|(field, kind)| (String::from_utf8_lossy(field), kind)).next();
+    first.is_some_and(|(field, kind)| {
+        matches!(kind, ColumnKind::Number | ColumnKind::Date) && classify(&field) == FieldKind::Text
+    })
+}
+
+/// A line that is no row, which is an error unless it is at the end.
+enum Skipped {
+    Ragged(Ragged),
+    Value(MissingValue),
+}
+
+impl Skipped {
+    fn error(
+        self,
+        file: &SourceFile<'_>,
+        layout: &TextLayout,
+        wanted: &[WantedField],
+    ) -> Result<RecordError, RecordError> {
+        match self {
+            Self::Ragged(this) => this.error(file, layout),
+            Self::Value(this) => not_a_number(file, layout, this.offset, &wanted[this.field], this.text),
+        }
+    }
 }
 
 /// A row with another number of fields than the header.
