@@ -310,7 +310,7 @@ fn has_word(name: &str, list: &[&str]) -> bool {
         let stem = word.trim_end_matches(|c: char| c.is_ascii_digit());
         let is_part =
             |known: &&str| known.chars().count() >= 4 && (word.starts_with(*known) || word.ends_with(*known));
-        list.contains(&word) || list.contains(&stem) || list.iter().any(|known| is_part(known))
+        list.contains(&word) || list.contains(&stem) || list.iter().any(is_part)
     })
 }
 
