@@ -6,7 +6,7 @@ use crate::column_map::{Column, ColumnMap};
 use crate::error::RecordError;
 use crate::recording::JOINTS;
 use crate::text::layout::{ColumnKind, ColumnSample};
-use crate::units::{Dimension, Unit, is_commanded, is_time, quantity_of, split_name, vector_of};
+use crate::units::{Dimension, Unit, is_commanded, is_time, quantity_of, split_name, unit_at, vector_of};
 
 /// Quantity of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,6 +70,18 @@ pub(crate) struct TableHead<'a> {
     pub kinds: &'a [ColumnKind],
     /// Values in some rows of a text; empty for other formats.
     pub samples: &'a [ColumnSample],
+}
+
+impl<'a> TableHead<'a> {
+    /// Columns of a file that is no text, in which only names, units and kinds are known before the columns are read.
+    pub(crate) fn of_columns(
+        path: &'a Path,
+        names: &'a [String],
+        units: &'a [Option<Unit>],
+        kinds: &'a [ColumnKind],
+    ) -> Self {
+        Self { path, line: 1, names, named: true, units, kinds, samples: &[] }
+    }
 }
 
 /// How the parts of a column make one value.
@@ -254,7 +266,7 @@ impl MappedColumns {
 
 /// The unit of a column: from the row of units or its type, or from its name.
 pub(crate) fn unit_of(head: TableHead<'_>, index: usize) -> Option<Unit> {
-    head.units.get(index).copied().flatten().or_else(|| split_name(head.names.get(index)?).unit)
+    unit_at(head.units, head.names, index)
 }
 
 /// A column with the unit in the file, if it is a unit of the quantity.

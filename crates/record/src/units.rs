@@ -192,6 +192,11 @@ pub fn split_name(name: &str) -> NameParts {
     }
 }
 
+/// The unit of a column: from the row of units or its type, else from its name.
+pub(crate) fn unit_at(units: &[Option<Unit>], names: &[String], index: usize) -> Option<Unit> {
+    units.get(index).copied().flatten().or_else(|| split_name(names.get(index)?).unit)
+}
+
 const TIME_WORDS: &[&str] = &[
     "time",
     "t",

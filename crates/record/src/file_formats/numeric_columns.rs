@@ -72,15 +72,7 @@ impl ColumnsOfFile<'_> {
                 if unreadable.is_empty() { String::new() } else { format!(": {}", unreadable.join("; ")) };
             return Err(self.error(format!("it has no column of numbers{why}")));
         }
-        let mapped = map(TableHead {
-            path,
-            line: 1,
-            names: &names,
-            named: true,
-            units: &units,
-            kinds: &kinds,
-            samples: &[],
-        });
+        let mapped = map(TableHead::of_columns(path, &names, &units, &kinds));
         let mapped = mapped.map_err(|error| match (error, unreadable.is_empty()) {
             (error, true) => error,
             (error, false) => self.error(format!("{error}; not read: {}", unreadable.join("; "))),

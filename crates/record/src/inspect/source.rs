@@ -183,15 +183,7 @@ pub fn inspect_bytes(bytes: &[u8], path: &Path, options: &InspectOptions) -> Res
                 let names: Vec<String> = used.iter().map(|at| names[*at].clone()).collect();
                 let units: Vec<Option<Unit>> = used.iter().map(|at| units[*at]).collect();
                 let kinds: Vec<ColumnKind> = used.iter().map(|at| kinds[*at]).collect();
-                let head = TableHead {
-                    path,
-                    line: 1,
-                    names: &names,
-                    named: true,
-                    units: &units,
-                    kinds: &kinds,
-                    samples: &[],
-                };
+                let head = TableHead::of_columns(path, &names, &units, &kinds);
                 let facts = FileFacts {
                     path,
                     format: kind.name().to_owned(),

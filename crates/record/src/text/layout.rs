@@ -3,7 +3,7 @@
 use super::delimiter::{DELIMITERS, Delimiter, split};
 use super::number::{FieldKind, Separators, classify, parse_date_ns, parse_number};
 use super::ros;
-use crate::units::{Dimension, Unit, parse_unit, quantity_of, split_name};
+use crate::units::{Dimension, Unit, parse_unit, quantity_of, split_name, unit_at};
 
 /// Contents of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -72,7 +72,7 @@ pub(crate) struct TextLayout {
     pub units: Vec<Option<Unit>>,
     pub units_line: Option<u64>,
     pub kinds: Vec<ColumnKind>,
-    /// Fewest fields of a row; the columns behind them, such as remarks, are empty in most rows.
+    /// Fewest fields of a row: the columns behind them are remarks, which may be missing.
     pub least_width: usize,
     pub samples: Vec<ColumnSample>,
     /// Offset and line of the first row.
@@ -302,7 +302,7 @@ impl TextLayout {
     }
 
     fn unit(&self, at: usize) -> Option<Unit> {
-        self.units.get(at).copied().flatten().or_else(|| split_name(self.names.get(at)?).unit)
+        unit_at(&self.units, &self.names, at)
     }
 
     /// The layout with values of the columns in the first rows and in `spread`, lines spread over the text.

@@ -204,21 +204,20 @@ pub(crate) fn read_rows(
         let open_quote = || row.iter().any(|field| field.contains(&b'\n') || field.contains(&b'\r'));
         let may_end = (is_ragged || failed.is_some()) && read.rows >= MIN_ROWS_BEFORE_CUT && !open_quote();
         let is_text = may_end && begins_with_text(&row, layout);
-        match &mut tail {
-            Some((left_out, _)) if is_text && left_out.is_text && left_out.lines < MAX_TEXT_LINES => {
-                left_out.lines += 1;
-                continue;
+        if let Some((left_out, _)) = &mut tail
+            && is_text
+            && left_out.is_text
+            && left_out.lines < MAX_TEXT_LINES
+        {
+            left_out.lines += 1;
+            continue;
+        }
+        if let Some((_, skipped)) = tail.take() {
+            match (skipped, tolerance) {
+                (skipped, Tolerance::Strict) => return Err(skipped.error(file, layout, wanted)?),
+                (Skipped::Ragged(this), _) => ragged.get_or_insert((0, this)).0 += 1,
+                (Skipped::Value(this), _) => count_bad(&mut bad, this),
             }
-            Some(_) => {
-                let skipped = tail.take().map(|(_, skipped)| skipped);
-                match (skipped, tolerance) {
-                    (Some(skipped), Tolerance::Strict) => return Err(skipped.error(file, layout, wanted)?),
-                    (Some(Skipped::Ragged(this)), _) => ragged.get_or_insert((0, this)).0 += 1,
-                    (Some(Skipped::Value(this)), _) => count_bad(&mut bad, this),
-                    (None, _) => {}
-                }
-            }
-            None => {}
         }
         if let (Some(at), true) = (failed, is_text) {
             let skipped =
