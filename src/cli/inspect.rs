@@ -6,8 +6,8 @@ use crate::cli::terminal_output::{print, print_error};
 use crate::cli::text_plot::plot;
 use std::fmt::Write as _;
 use stylet_api::output_folder::write_file_atomically;
-use stylet_record::RecordError;
-use stylet_record::inspect::{InspectOptions, Inspection, inspect as inspect_file};
+use stylet_record::inspect::{InspectOptions, Inspection};
+use stylet_record::{RecordError, inspect_and_read};
 use stylet_report::significant;
 
 /// Columns that the terminal lists.
@@ -29,7 +29,7 @@ pub fn inspect(args: &InspectArgs) -> Result<(), Failure> {
     }
     let (mut inspections, mut failed): (Vec<Inspection>, Vec<RecordError>) = (Vec::new(), Vec::new());
     for file in &args.files {
-        match inspect_file(file, &options) {
+        match inspect_and_read(file, &options) {
             Ok(inspection) => {
                 if !args.json {
                     print(&summary(&inspection, args))?;

@@ -136,6 +136,9 @@ pub fn main() -> ExitCode {
 /// The error with an excerpt of the source where that can be rendered, else the message alone.
 fn rendered(failure: Failure) -> String {
     let message = failure.to_string();
+    // Lines are left whole, so that commands in messages can be copied.
+    let _ =
+        miette::set_hook(Box::new(|_| Box::new(miette::MietteHandlerOpts::new().wrap_lines(false).build())));
     let report = miette::Report::new(failure);
     std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| format!("{report:?}\n")))
         .unwrap_or_else(|_| format!("{message}\n"))

@@ -68,12 +68,12 @@ pub(crate) struct TableHead<'a> {
     /// Units from a row of units or from typed columns.
     pub units: &'a [Option<Unit>],
     pub kinds: &'a [ColumnKind],
-    /// Values in some rows of a text; empty for other formats.
+    /// Values of the columns in some rows; empty where they are not known.
     pub samples: &'a [ColumnSample],
 }
 
 impl<'a> TableHead<'a> {
-    /// Columns of a file that is no text, in which only names, units and kinds are known before the columns are read.
+    /// Columns of a file that is no text, without samples.
     pub(crate) fn of_columns(
         path: &'a Path,
         names: &'a [String],

@@ -305,7 +305,7 @@ fn excerpt(text: &str) -> String {
 }
 
 fn list(names: &[String]) -> String {
-    const MOST: usize = 40;
+    const MOST: usize = 12;
     let mut text = names.iter().take(MOST).map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ");
     if names.len() > MOST {
         text.push_str(&format!(" and {} more", names.len() - MOST));

@@ -49,6 +49,7 @@ mod insertion_axis;
 pub mod inspect;
 pub mod long_recording;
 pub mod memory_limit;
+mod proposed_map;
 mod quality;
 pub mod recording;
 mod row_groups;
@@ -68,6 +69,7 @@ pub use downsample::downsample;
 pub use error::RecordError;
 pub use ground_truth::{LayerTruth, TrueRupture, Truth};
 pub use long_recording::{LongRecording, read_long_csv};
+pub use proposed_map::inspect_and_read;
 pub use quality::{
     MIN_SAMPLES, QualityKind, QualityNote, assess, check_distinct, check_usable, find_outlier_recordings,
     sensor_artefacts,

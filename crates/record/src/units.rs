@@ -300,16 +300,29 @@ const OTHER_WORDS: &[&str] = &[
     "counts",
     "ticks",
     "sequence",
+    "tau",
 ];
 /// Further such words, unless another word says which quantity it is, as in `current position`.
 const FURTHER_OTHER_WORDS: &[&str] =
-    &["current", "voltage", "volt", "volts", "status", "index", "seq", "joint", "q"];
+    &["current", "voltage", "volt", "volts", "status", "index", "seq", "joint", "q", "dq"];
 const VELOCITY_WORDS: &[&str] =
     &["velocity", "vel", "speed", "v", "vz", "geschwindigkeit", "vitesse", "prędkość", "velocidad"];
 
+/// The words of `cartForce1` separated.
+fn separated(name: &str) -> String {
+    let all: Vec<char> = name.chars().collect();
+    let begins = |at: usize| {
+        at > 0
+            && all[at].is_uppercase()
+            && all[at - 1].is_lowercase()
+            && all.get(at + 1).is_some_and(|c| c.is_lowercase())
+    };
+    (0..all.len()).flat_map(|at| begins(at).then_some(' ').into_iter().chain([all[at]])).collect()
+}
+
 /// Whether a name has one of these words, with or without a number behind it; a word of four letters may be a part of another one.
 fn has_word(name: &str, list: &[&str]) -> bool {
-    let lower = name.to_lowercase();
+    let lower = separated(name).to_lowercase();
     let mut words = lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
     words.any(|word| {
         let stem = word.trim_end_matches(|c: char| c.is_ascii_digit());
@@ -396,6 +409,8 @@ mod tests {
             assert!(found.1.is_none() || name == "position_in", "{name}: {found:?}");
         }
         assert_eq!(quantity_of("wrench.torque.z"), None);
+        assert_eq!(quantity_of("cartForce1_Z"), Some(Dimension::Force));
+        assert_eq!(quantity_of("cartPosMsr1_X"), Some(Dimension::Length));
         assert_eq!(quantity_of("/ft_sensor/wrench.wrench.force.z"), Some(Dimension::Force));
         assert_eq!(quantity_of("Przemieszczenie"), Some(Dimension::Length));
     }

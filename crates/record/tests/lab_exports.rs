@@ -181,6 +181,31 @@ fn a_column_that_its_name_alone_does_not_decide_is_asked_for() {
     assert_is_the_insertion(&read(&text, &ReadOptions::default()).expect("read"));
 }
 
+#[cfg(feature = "formats")]
+#[test]
+fn a_column_of_a_parquet_file_that_its_name_alone_does_not_decide_is_asked_for() {
+    let column = |name: &str, of: &dyn Fn([f64; 3]) -> f64| {
+        (name.to_owned(), (0..ROWS).map(|k| of(sample(k))).collect::<Vec<f64>>())
+    };
+    let file = |rest_mm: f64| {
+        let columns = [
+            column("t_s", &|[t, ..]| t),
+            column("x_mm", &|[_, z, _]| rest_mm * z),
+            column("z_mm", &|[_, z, _]| z),
+            column("force_n", &|[.., f]| f),
+        ];
+        stylet_record::file_formats::columns_to_parquet(&columns, Path::new("log.parquet")).expect("written")
+    };
+    let read = |bytes: &[u8]| {
+        read_csv_bytes(bytes, Path::new("log.parquet"), &ReadOptions::default()).map(|(r, _)| r)
+    };
+    assert_is_the_insertion(&read(&file(0.01)).expect("a side motion decides nothing"));
+    let message = read(&file(2.0)).expect_err("a refusal").to_string();
+    assert!(message.contains("several columns") && message.contains("x_mm"), "{message}");
+    let found = inspect_bytes(&file(2.0), Path::new("log.parquet"), &InspectOptions::default());
+    assert!(!found.expect("a table").is_readable());
+}
+
 #[test]
 fn position_and_force_with_clocks_of_their_own_are_refused_if_these_differ() {
     let head = "Time_Force [s],Force [N],Time_Position [s],Position [mm]\n";
@@ -260,4 +285,44 @@ fn marks_of_meters_and_spreadsheets_are_missing_values() {
         });
         assert_eq!(read(&text, &ReadOptions::default()).expect(mark).len(), ROWS - 1);
     }
+}
+
+/// 200 rows from ten seconds before midnight; dates of a spreadsheet as days.
+#[test]
+fn times_of_day_pass_midnight_and_days_are_proposed_for_the_numbers_of_a_spreadsheet() {
+    let clock = |s: f64| {
+        let s = if s < 0.0 { s + 86_400.0 } else { s };
+        format!("{:02}:{:02}:{:06.3}", (s / 3600.0) as u32, (s / 60.0) as u32 % 60, s % 60.0)
+    };
+    let midnight =
+        text("Time,Position [mm],Force [N]\n", |_, [t, z, f]| format!("{},{z},{f}", clock(t - 1.0)));
+    assert_is_the_insertion(&read(&midnight, &ReadOptions::default()).expect("read"));
+    let days = text("Time,Position [mm],Force [N]\n", |_, [t, z, f]| {
+        format!("{:.12},{z},{f}", 45_244.585_543_981 + t / 86_400.0)
+    });
+    let r = read_as_proposed(&days);
+    assert!((r.time_s[ROWS - 1] - r.time_s[0] - sample(ROWS - 1)[0]).abs() < 1e-4);
+}
+
+#[test]
+fn an_inspection_reads_the_file_and_reverses_signs_that_run_the_other_way() {
+    let folder = std::env::temp_dir().join(format!("stylet-signs-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let path = folder.join("log.csv");
+    for (reversed, signs) in
+        [([1.0, 1.0], [1, 1]), ([-1.0, 1.0], [-1, 1]), ([1.0, -1.0], [1, -1]), ([-1.0; 2], [-1; 2])]
+    {
+        let rows = text("time_s,position_mm,force_n\n", |k, [t, z, f]| {
+            let noise = 0.01 * ((k * 7919) % 13) as f64 / 13.0;
+            format!("{t},{},{}", reversed[0] * z, reversed[1] * f + noise)
+        });
+        std::fs::write(&path, rows).expect("written");
+        let found = stylet_record::inspect_and_read(&path, &InspectOptions::default()).expect("a table");
+        assert_eq!(found.is_readable(), signs == [1, 1], "{signs:?}: {:?}", found.findings);
+        let sign = |scale: Option<f64>| scale.map_or(1, |x| x.signum() as i32);
+        assert_eq!([sign(found.map.position.scale), sign(found.map.force.scale)], signs);
+        let options = InspectOptions { columns: Some(found.map) };
+        assert!(stylet_record::inspect_and_read(&path, &options).expect("a table").is_readable());
+    }
+    std::fs::remove_dir_all(&folder).expect("removed");
 }

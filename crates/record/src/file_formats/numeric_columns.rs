@@ -1,9 +1,9 @@
 //! Named columns of numbers in a file.
 
-use crate::columns::{ColumnRole, MappedColumns, TableHead};
+use crate::columns::{ColumnRole, MappedColumns, TableHead, unit_of};
 use crate::error::RecordError;
-use crate::text::layout::ColumnKind;
-use crate::units::Unit;
+use crate::text::layout::{ColumnKind, ColumnSample};
+use crate::units::{Dimension, Unit};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
@@ -24,6 +24,15 @@ impl NamedColumn {
 
 /// A column that was read: name and values.
 pub(crate) type NamedValues = (String, Vec<f64>);
+
+/// Samples of the columns whose values are given and whose units are known.
+pub(crate) fn column_samples(head: TableHead<'_>, values: &[NamedValues]) -> Vec<ColumnSample> {
+    let sample = |(at, name): (usize, &String)| {
+        let (_, column) = values.iter().find(|(of, _)| of == name)?;
+        Some(ColumnSample::of_extremes(column, unit_of(head, at)?.to_si))
+    };
+    head.names.iter().enumerate().map(|column| sample(column).unwrap_or_default()).collect()
+}
 
 /// A file with named columns of numbers.
 pub(crate) trait NumericColumns {
@@ -72,7 +81,9 @@ impl ColumnsOfFile<'_> {
                 if unreadable.is_empty() { String::new() } else { format!(": {}", unreadable.join("; ")) };
             return Err(self.error(format!("it has no column of numbers{why}")));
         }
-        let mapped = map(TableHead::of_columns(path, &names, &units, &kinds));
+        let head = TableHead::of_columns(path, &names, &units, &kinds);
+        let samples = column_samples(head, &self.read_rivals(head));
+        let mapped = map(TableHead { samples: &samples, ..head });
         let mapped = mapped.map_err(|error| match (error, unreadable.is_empty()) {
             (error, true) => error,
             (error, false) => self.error(format!("{error}; not read: {}", unreadable.join("; "))),
@@ -82,6 +93,21 @@ impl ColumnsOfFile<'_> {
         let columns = self
             .read_named(&wanted, mapped.of(ColumnRole::Force).and_then(|c| names.get(*c.indices.first()?)))?;
         Ok((mapped, columns))
+    }
+
+    /// Columns of length and force where there are several, whose values decide between them; none if they cannot be read.
+    fn read_rivals(&self, head: TableHead<'_>) -> Vec<NamedValues> {
+        let all_of = |dimension: Dimension| {
+            let is_one = |at: &usize| unit_of(head, *at).is_some_and(|unit| unit.dimension == dimension);
+            let all: Vec<&str> =
+                (0..head.names.len()).filter(is_one).map(|at| head.names[at].as_str()).collect();
+            if all.len() > 1 { all } else { Vec::new() }
+        };
+        let wanted = [all_of(Dimension::Length), all_of(Dimension::Force)].concat();
+        if wanted.is_empty() {
+            return Vec::new();
+        }
+        self.read_equal(&wanted).map(|(columns, _)| columns).unwrap_or_default()
     }
 
     /// The columns of these names. Rows are those of `main`, or of the first one.

@@ -214,12 +214,12 @@ impl Chosen {
         let mut reason = match (certain, unit) {
             (true, _) if found.scale_is_given => "the column map".to_owned(),
             (true, _) => "name and unit".to_owned(),
-            (false, Some(unit)) => format!("the unit {}", unit.symbol),
-            (false, None) => "the values".to_owned(),
+            (false, Some(unit)) => format!("by the unit {}", unit.symbol),
+            (false, None) => "by its values".to_owned(),
         };
         let name_of = |name: &str| quantity_of(&split_name(name).base) == Some(role.dimension());
         if !certain && head.named && head.names.get(first).is_some_and(|name| name_of(name)) {
-            reason = format!("the name \"{}\"", head.names[first]);
+            reason = "by its name".to_owned();
         }
         let first_time = origin.map_or(column.first, |x| x as f64);
         let epoch = epoch_unit(first_time * found.scale)
@@ -245,7 +245,7 @@ impl Chosen {
                 }
                 proposals = all;
             } else if unit.is_none() && !certain {
-                reason.push_str("; the unit is not given: SI assumed");
+                reason.push_str("; no unit is given, SI is assumed");
                 proposals = all;
             }
         }

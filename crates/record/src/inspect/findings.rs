@@ -69,10 +69,10 @@ fn columns(found: &mut Findings<'_>, head: TableHead<'_>, chosen: &Chosen, facts
             // Reported below.
             (RecordError::MissingColumn { .. }, None) => continue,
             (RecordError::MissingColumn { .. }, Some(candidate)) => format!(
-                "no column is the {} by name and unit; {} suggests \"{}\"",
+                "the {} is probably \"{}\": {}",
                 role.name(),
-                candidate.reason,
-                candidate.names.join(", ")
+                candidate.names.join(", "),
+                candidate.reason
             ),
             _ => without_path(error, found.path),
         };

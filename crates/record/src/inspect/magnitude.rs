@@ -49,7 +49,8 @@ const FORCES: Units = &[
     ("kN", 1e3, 0.5),
     ("µN", 1e-6, 1.0),
 ];
-const TIMES: Units = &[("s", 1.0, 0.0), ("ms", 1e-3, 0.0), ("µs", 1e-6, 0.0), ("ns", 1e-9, 0.0)];
+const TIMES: Units =
+    &[("s", 1.0, 0.0), ("ms", 1e-3, 0.0), ("µs", 1e-6, 0.0), ("ns", 1e-9, 0.0), ("days", 86_400.0, 0.0)];
 
 /// Units that would make a magnitude plausible, the most typical one first: of a length the travel, of a force the largest
 /// one, of a time the sampling interval.
@@ -82,7 +83,7 @@ pub fn is_implausible(dimension: Dimension, magnitude: f64) -> bool {
     match dimension {
         Dimension::Length => magnitude > TRAVELS_M.1,
         Dimension::Force => magnitude > FORCES_N.1 / 5.0,
-        Dimension::Time => magnitude > INTERVALS_S.1,
+        Dimension::Time => magnitude > 0.0 && !(INTERVALS_S.0..=INTERVALS_S.1).contains(&magnitude),
         Dimension::Velocity | Dimension::Other => false,
     }
 }
@@ -132,6 +133,7 @@ mod tests {
         assert_eq!(first(Dimension::Length, 86_000.0), "µm");
         assert_eq!(first(Dimension::Time, 5e6), "ns");
         assert_eq!(first(Dimension::Time, 5.0), "ms");
+        assert_eq!(first(Dimension::Time, 1.157e-7), "days");
         assert_eq!(epoch_unit(1.7e18), Some(("nanoseconds", 1e-9)));
         assert_eq!(epoch_unit(1.7e12), Some(("milliseconds", 1e-3)));
         assert_eq!(epoch_unit(1.7e9), None);

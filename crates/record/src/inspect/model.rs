@@ -61,6 +61,24 @@ impl Inspection {
         self.candidates.iter().find(|candidate| candidate.role == role)
     }
 
+    /// Reverses the sign of a quantity in the proposed map and in the curves.
+    pub(crate) fn reverse(&mut self, role: Role) {
+        let (column, curve) = match role {
+            Role::Position => (&mut self.map.position, &mut self.curves.position_m),
+            Role::Force => (&mut self.map.force, &mut self.curves.force_n),
+            Role::Time | Role::Velocity => return,
+        };
+        curve.iter_mut().for_each(|x| *x = -*x);
+        column.offset = -column.offset;
+        if let Some(candidate) = self.candidates.iter_mut().find(|candidate| candidate.role == role) {
+            candidate.scale = -candidate.scale;
+            column.scale = Some(candidate.scale);
+            candidate.certain = false;
+            candidate.reason.push_str("; the sign is reversed");
+        }
+        self.map_needed = true;
+    }
+
     /// The proposed map as a RON file, with remarks.
     #[must_use]
     pub fn to_ron(&self) -> String {
@@ -216,7 +234,7 @@ pub struct Sampling {
 /// A finding about a file.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
-    /// Kind: `columns`, `time`, `unit`, `sampling`, `values`, `layout`.
+    /// Kind: `columns`, `time`, `unit`, `sampling`, `values`, `layout`, `quality`.
     pub kind: &'static str,
     /// What and where, and the remedy.
     pub message: String,

@@ -6,6 +6,7 @@ use super::{InspectOptions, InspectedColumn, Inspection, TextFacts, candidates, 
 use crate::column_map::ColumnMap;
 use crate::columns::TableHead;
 use crate::error::RecordError;
+use crate::file_formats::numeric_columns::column_samples;
 use crate::file_formats::{FileFormat, Foreign};
 use crate::table_source::{decoded, read_bytes};
 use crate::text::encoding;
@@ -184,6 +185,8 @@ pub fn inspect_bytes(bytes: &[u8], path: &Path, options: &InspectOptions) -> Res
                 let units: Vec<Option<Unit>> = used.iter().map(|at| units[*at]).collect();
                 let kinds: Vec<ColumnKind> = used.iter().map(|at| kinds[*at]).collect();
                 let head = TableHead::of_columns(path, &names, &units, &kinds);
+                let samples = column_samples(head, &columns);
+                let head = TableHead { samples: &samples, ..head };
                 let facts = FileFacts {
                     path,
                     format: kind.name().to_owned(),

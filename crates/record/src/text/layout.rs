@@ -35,6 +35,13 @@ pub(crate) struct ColumnSample {
 const CLOCK_SHARE: f64 = 0.9;
 
 impl ColumnSample {
+    /// A column of a file that is no text: its extremes in SI units, of values in units of `to_si`.
+    pub(crate) fn of_extremes(values: &[f64], to_si: f64) -> Self {
+        let known = || values.iter().map(|x| x * to_si).filter(|x| x.is_finite());
+        let (low, high) = (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
+        Self { spread: vec![low, high], ..Self::default() }
+    }
+
     /// Largest less smallest value.
     pub(crate) fn range(&self) -> f64 {
         let known = || self.spread.iter().copied().filter(|x| x.is_finite());
@@ -380,8 +387,16 @@ fn header(all: &[Line<'_>], first: usize, block: &Block, hints: LayoutHints) -> 
         width == block.width || (fields.len() == block.width + 1 && width == block.width + 1)
     };
     let is_given = |at: usize| hints.header_line == Some(all[at].number);
+    let has_letters = |fields: &[String]| fields.iter().any(|f| f.chars().any(char::is_alphabetic));
+    // Below names and units there may be a row of channels, which is neither.
+    let is_row_of_channels = |place: usize| match &above[place..] {
+        [_, (_, units), (_, names), ..] => {
+            fits(units) && is_row_of_units(units) && fits(names) && has_letters(names)
+        }
+        _ => false,
+    };
     let mut names_at = None;
-    for (at, fields) in &above {
+    for (place, (at, fields)) in above.iter().enumerate() {
         if is_given(*at) {
             let mut fields = fields.clone();
             fields.truncate(data_width(&fields).max(block.width));
@@ -399,7 +414,9 @@ fn header(all: &[Line<'_>], first: usize, block: &Block, hints: LayoutHints) -> 
         if is_row_of_units(fields) && header.units_line.is_none() {
             header.units = fields.iter().map(|field| parse_unit(field)).collect();
             header.units_line = Some(all[*at].number);
-        } else if hints.header_line.is_none() && fields.iter().any(|f| f.chars().any(char::is_alphabetic)) {
+        } else if header.units_line.is_none() && is_row_of_channels(place) {
+            continue;
+        } else if hints.header_line.is_none() && has_letters(fields) {
             let mut fields = fields.clone();
             fields.truncate(data_width(&fields));
             header.names = Some(fields);
@@ -513,6 +530,13 @@ mod tests {
         assert_eq!(found.units[1].map(|u| u.symbol), Some("mm"));
         assert!(found.decimal_comma);
         assert_eq!(found.preamble.len(), 2);
+    }
+
+    #[test]
+    fn a_row_of_channels_below_names_and_units_holds_neither() {
+        let found = layout("Time;Force_U9C;Stage\ns;N;mm\nCH1;CH2;CH3\n0,0;0,01;-1,5\n0,1;0,02;-1,4\n");
+        assert_eq!(found.names, ["Time", "Force_U9C", "Stage"]);
+        assert_eq!((found.names_line, found.units_line, found.data_line), (Some(1), Some(2), 4));
     }
 
     #[test]

@@ -343,6 +343,14 @@ impl Ragged {
     }
 }
 
+/// Nanoseconds from `origin` to `ns`. Of times of day, without a date, the one that is more than half a day before the first is of the next day.
+fn since(origin: i64, ns: i64) -> Option<i64> {
+    const DAY_NS: i64 = 86_400_000_000_000;
+    let elapsed = ns.checked_sub(origin)?;
+    let is_next_day = (0..DAY_NS).contains(&origin) && (0..DAY_NS).contains(&ns) && elapsed < -DAY_NS / 2;
+    Some(if is_next_day { elapsed + DAY_NS } else { elapsed })
+}
+
 /// The value of a field, NaN when it is missing, `None` when it is not a number.
 #[inline]
 fn value(layout: &TextLayout, field: &WantedField, bytes: &[u8], origin: &mut Option<i64>) -> Option<f64> {
@@ -351,7 +359,7 @@ fn value(layout: &TextLayout, field: &WantedField, bytes: &[u8], origin: &mut Op
     if field.kind == ColumnKind::Date {
         return match parse_date_ns(text) {
             // Division rounds correctly, multiplication by 1e-9 does not.
-            Some(ns) => ns.checked_sub(*origin.get_or_insert(ns)).map(|ns| ns as f64 / 1e9),
+            Some(ns) => since(*origin.get_or_insert(ns), ns).map(|ns| ns as f64 / 1e9),
             None => is_missing(text.trim()).then_some(f64::NAN),
         };
     }
