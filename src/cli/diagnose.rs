@@ -16,13 +16,13 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         return crate::cli::transfer::diagnose(args, model);
     }
     let Some(file) = &args.scenario else {
-        if args.repeats {
-            return Err(Failure::Check("--repeats needs a scenario or a data set".to_owned()));
-        }
         if !args.effects.is_empty() {
             return Err(Failure::Check("--effects needs a scenario".to_owned()));
         }
-        return crate::cli::identify::diagnose(args);
+        return match args.repeats {
+            true => crate::cli::diagnose_repeats::diagnose_without_scenario(args),
+            false => crate::cli::identify::diagnose(args),
+        };
     };
     // The scenario may be the result of an interrupted diagnosis.
     recover_parent(file)?;

@@ -2,27 +2,58 @@
 
 use crate::cli::args::DiagnoseArgs;
 use crate::cli::exit_codes::Failure;
+use crate::cli::identify::{FOUND_FILE, NO_SCENARIO, first_recording};
 use crate::cli::terminal_output::stage_printer;
 use std::fmt::Write as _;
 use std::path::Path;
-use stylet_api::diagnose_repeats::{diagnose_repeats, load_data_set, recording_files};
+use stylet_api::DiagnosisInputs;
+use stylet_api::diagnose_repeats::{
+    data_set_of_recordings, diagnose_repeats, load_data_set, recording_files,
+};
 use stylet_api::diagnose_specimens::{SpecimensReport, diagnose_specimens};
 use stylet_api::output_folder::check_folder;
 use stylet_api::resource_estimate;
+use stylet_diagnose::repeated_insertions::dataset::Dataset;
 use stylet_diagnose::repeated_insertions::diagnose_set::SetDiagnosis;
 use stylet_record::QualityKind;
 use stylet_report::pages::formatting::three_decimals;
 use stylet_report::pages::repeated_insertions::{online_enhancement, summary_sentence};
 use stylet_report::significant;
+use stylet_scenario::Scenario;
 
-/// The command.
+/// The command with a scenario or a data set.
 ///
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn diagnose(args: &DiagnoseArgs, file: &Path) -> Result<(), Failure> {
-    let (inputs, results) = (args.reading.inputs(file, &args.data, &args.effects), &args.results);
+    let inputs = args.reading.inputs(file, &args.data, &args.effects);
     let set = load_data_set(&inputs)?;
-    let files = recording_files(&set, &args.data)?;
+    run(args, file, &inputs, &set, None)
+}
+
+/// The command without a scenario: the layers are those that the recordings show.
+///
+/// # Errors
+/// [`Failure`] with the exit code that fits.
+pub fn diagnose_without_scenario(args: &DiagnoseArgs) -> Result<(), Failure> {
+    let first = first_recording(&args.data)?;
+    let folder = args.results.output_folder(first, "-diagnosis");
+    let inputs = args.reading.inputs(&folder.join(FOUND_FILE), &args.data, &[]);
+    let name = first.file_stem().map_or_else(|| "phantom".to_owned(), |s| s.to_string_lossy().into_owned());
+    let (scenario, set) = data_set_of_recordings(&name, &inputs)?;
+    run(args, first, &inputs, &set, Some(&scenario))
+}
+
+/// Diagnoses; `found_scenario` is the one from the recordings, if none was given.
+fn run(
+    args: &DiagnoseArgs,
+    file: &Path,
+    inputs: &DiagnosisInputs,
+    set: &Dataset,
+    found_scenario: Option<&Scenario>,
+) -> Result<(), Failure> {
+    let results = &args.results;
+    let files = recording_files(set, &args.data)?;
     let estimate = if set.split_by.is_empty() {
         resource_estimate::estimate_diagnose_repeats(&files)
     } else {
@@ -35,17 +66,21 @@ pub fn diagnose(args: &DiagnoseArgs, file: &Path) -> Result<(), Failure> {
     let limit = args.limits.start_time_limit(file);
     let runs = set.load_recordings(&files, set.tissue.layers.len())?;
     if !set.split_by.is_empty() {
-        let found = diagnose_specimens(&set, &runs)?;
+        let found = diagnose_specimens(set, &runs)?;
         drop(limit);
-        let output = found.output(&set, &inputs)?.with_inputs(read);
+        let output = found.output(set, inputs)?.with_inputs(read);
         return results.write_and_print(&folder, &output, || specimens_summary(&found));
     }
     let mut progress = stage_printer(results.quiet, "");
-    let found = diagnose_repeats(&set, &runs, !args.data.is_empty(), &mut progress)?;
+    let found = diagnose_repeats(set, &runs, !args.data.is_empty(), &mut progress)?;
     drop(limit);
-    results.write_and_print(&folder, &found.output(&set, &inputs)?.with_inputs(read), || {
-        format!("{}{}", summary(&found.study), online_enhancement::summary(&found.online))
-    })
+    let mut output = found.output(set, inputs)?;
+    let mut text = format!("{}{}", summary(&found.study), online_enhancement::summary(&found.online));
+    if let Some(scenario) = found_scenario {
+        output.add(FOUND_FILE, scenario.to_ron().map_err(stylet_api::Error::internal)?);
+        text.insert_str(0, NO_SCENARIO);
+    }
+    results.write_and_print(&folder, &output.with_inputs(read), || text)
 }
 
 fn summary(study: &SetDiagnosis) -> String {

@@ -10,7 +10,10 @@ use stylet_api::resource_estimate;
 use stylet_diagnose::Diagnosis;
 
 /// File with the layers that the diagnosis started from.
-const FOUND_FILE: &str = "assumed.ron";
+pub(super) const FOUND_FILE: &str = "assumed.ron";
+/// Begins the summary.
+pub(super) const NO_SCENARIO: &str =
+    "No scenario was given: the layers are those that the recordings show.\n";
 /// First line of a written phantom, by which an earlier one is recognised.
 const PHANTOM_COMMENT: &str = "// Phantom identified by stylet";
 
@@ -39,13 +42,24 @@ pub fn diagnose(args: &DiagnoseArgs) -> Result<(), Failure> {
         results: args.results.clone(),
         limits: args.limits,
     };
-    run(&args, None, |d| {
-        format!(
-            "No scenario was given: the layers are those that the recordings show.\n{}\n{}",
-            fitted_law(d),
-            summary(d)
-        )
-    })
+    run(&args, None, |d| format!("{NO_SCENARIO}{}\n{}", fitted_law(d), summary(d)))
+}
+
+/// The first of the recordings.
+///
+/// # Errors
+/// [`Failure::Check`] without recordings, or with a scenario among them.
+pub(super) fn first_recording(data: &[PathBuf]) -> Result<&Path, Failure> {
+    let Some(first) = data.first() else {
+        return Err(Failure::Check("no recordings: name them with --data A.csv B.csv".to_owned()));
+    };
+    match data.iter().find(|path| path.extension().is_some_and(|e| e == "ron")) {
+        None => Ok(first),
+        Some(scenario) => Err(Failure::Check(format!(
+            "{} is no recording; a scenario goes before --data: stylet diagnose {0} --data A.csv B.csv",
+            scenario.display()
+        ))),
+    }
 }
 
 fn run(
@@ -53,15 +67,7 @@ fn run(
     phantom: Option<&Path>,
     summary: impl FnOnce(&Diagnosis) -> String,
 ) -> Result<(), Failure> {
-    let Some(first) = args.data.first() else {
-        return Err(Failure::Check("no recordings: name them with --data A.csv B.csv".to_owned()));
-    };
-    if let Some(scenario) = args.data.iter().find(|path| path.extension().is_some_and(|e| e == "ron")) {
-        return Err(Failure::Check(format!(
-            "{} is no recording; a scenario goes before --data: stylet diagnose {0} --data A.csv B.csv",
-            scenario.display()
-        )));
-    }
+    let first = first_recording(&args.data)?;
     args.limits.check(first, &resource_estimate::estimate_diagnose(&args.data), args.results.quiet)?;
     let folder = args.results.output_folder(first, "-phantom");
     let inputs = args.reading.inputs(&folder.join(FOUND_FILE), &args.data, &[]);

@@ -1,5 +1,6 @@
 //! Diagnosis of repeated insertions: a data set, or a scenario and recordings of the same insertion.
 
+use crate::diagnose::usable_recordings;
 use crate::diagnosis_inputs::DiagnosisInputs;
 use crate::error::Error;
 use crate::output_files::{OutputFiles, one_line};
@@ -61,24 +62,45 @@ pub fn load_data_set(inputs: &DiagnosisInputs) -> Result<Dataset, Error> {
                 names.join(", ")
             )));
         }
-        Dataset {
-            name: scenario.name,
-            source: scenario.source,
-            columns: None,
-            tissue: scenario.tissue,
-            recordings: Vec::new(),
-            split_by: Vec::new(),
-            air: None,
-            load: None,
-            parts: Vec::new(),
-            repair: false,
-        }
+        data_set_of(scenario)
     };
+    apply_reading(&mut set, inputs)?;
+    Ok(set)
+}
+
+/// A scenario with the layers that the recordings of the inputs show, and the data set with its tissue.
+///
+/// # Errors
+/// As [`identify`](crate::identify).
+pub fn data_set_of_recordings(name: &str, inputs: &DiagnosisInputs) -> Result<(Scenario, Dataset), Error> {
+    let recordings = usable_recordings(&inputs.read_recordings()?)?;
+    let scenario = stylet_diagnose::scenario_from_recordings(name, &recordings, None)?;
+    let mut set = data_set_of(scenario.clone());
+    apply_reading(&mut set, inputs)?;
+    Ok((scenario, set))
+}
+
+fn data_set_of(scenario: Scenario) -> Dataset {
+    Dataset {
+        name: scenario.name,
+        source: scenario.source,
+        columns: None,
+        tissue: scenario.tissue,
+        recordings: Vec::new(),
+        split_by: Vec::new(),
+        air: None,
+        load: None,
+        parts: Vec::new(),
+        repair: false,
+    }
+}
+
+fn apply_reading(set: &mut Dataset, inputs: &DiagnosisInputs) -> Result<(), Error> {
     set.repair = inputs.repair;
     if let Some(path) = &inputs.columns {
         set.columns = Some(stylet_scenario::load(path)?);
     }
-    Ok(set)
+    Ok(())
 }
 
 /// The given recordings, or, if there are none, those of the data set.

@@ -94,10 +94,9 @@ fn layer_geometry(assumed: &Tissue, recordings: &[&SegmentedRecording], beyond_m
     tissue.surface_m = surface_m;
     let (mut loads_n, mut indented_m) = (Vec::new(), Vec::new());
     for (l, layer) in tissue.layers.iter_mut().enumerate() {
+        // Behind the last face there is no tissue, if the assumed one ends before the deepest point.
         if l + 1 < layers {
             layer.thickness_m = fronts_m[l + 1] - fronts_m[l];
-        } else {
-            layer.thickness_m = layer.thickness_m.max(deepest - fronts_m[l] + 0.02);
         }
         // Friction of the layers above carries a part of the load of deeper layers.
         let share = if l == 0 { 1.0 } else { 0.6 };

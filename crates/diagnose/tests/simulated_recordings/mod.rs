@@ -111,13 +111,18 @@ pub fn stick_slip_set(d: &SimulatedSet) -> Vec<SegmentedRecording> {
 
 /// Four recordings at each of two speeds with the base law: spring, viscous friction, puncture force.
 pub fn base_law_set(seed: u64) -> Vec<SegmentedRecording> {
+    base_law_set_in(&assumed_tissue(), seed)
+}
+
+/// The same in another tissue of one layer, with other parameters of its law.
+pub fn base_law_set_in(assumed: &Tissue, seed: u64) -> Vec<SegmentedRecording> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut out = Vec::new();
     for speed_mps in [2.5e-3, 6e-3] {
         for k in 0..4 {
             let (surface, tough): (f64, f64) =
                 (StandardNormal.sample(&mut rng), StandardNormal.sample(&mut rng));
-            let mut tissue = assumed_tissue();
+            let mut tissue = assumed.clone();
             tissue.surface_m += 1e-4 * surface;
             tissue.layers[0].stiffness_n_per_m = 250.0;
             tissue.layers[0].friction_ns_per_m2 = 2e4;
