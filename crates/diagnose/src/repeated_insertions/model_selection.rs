@@ -11,8 +11,8 @@ use crate::effect_selection::Search;
 use crate::random_effect_selection::select_random_effects;
 use rand::rngs::ChaCha8Rng;
 use std::sync::Arc;
-use stylet_identify::fit::{Effort, fit as fitted_on};
-use stylet_identify::model::{Model, RecordingParameters};
+use stylet_identify::fit::{Effort, Fit, fit as fitted_on};
+use stylet_identify::model::{Assumptions, Model, RecordingParameters};
 use stylet_record::sensor_artefacts::SensorArtefacts;
 use stylet_tissue::Tissue;
 
@@ -55,8 +55,15 @@ pub fn select_model(
         set_blocks(recordings, artefacts),
         quantisation_noise_n(artefacts),
     );
+    let (fit, _) = fit_base_law(&prepared)?;
+    // The first fit finds the ruptures; the second one starts with the elastic forces at them.
+    let assumed_law = Arc::new(with_forces_at_ruptures(&prepared.assumed, &fit));
+    let prepared = PreparedRecordings { assumed: assumed_law, ..prepared };
     let (fit, data) = fit_base_law(&prepared)?;
     let (fit, data) = select_random_effects(fit, data);
+    // Ruptures are at the drops that the base law explains, or at the largest drops, where another law holds.
+    let largest: Vec<Vec<f64>> = recordings.iter().map(|r| r.ruptures_s.clone()).collect();
+    let rupture_times_s = [fit.model.rupture_times_s.clone(), largest];
     let (searched, which) = search_subset(&prepared, recordings);
     let fewer = data.subset(&which);
     let fit = fitted_on(&fit.model.subset(&which), &fewer, Effort::FULL)?;
@@ -65,9 +72,12 @@ pub fn select_model(
     let on = |model: &Model| {
         let mut model = model.clone();
         model.per_recording = vec![RecordingParameters::default(); recordings.len()];
-        model.rupture_times_s = recordings.iter().map(|r| r.ruptures_s.clone()).collect();
         (model.free.recording_surface, model.free.recording_friction) = (true, true);
-        fit_from(&model, prepared.blocks.to_vec(), drops.clone())
+        let at = |times_s: &Vec<Vec<f64>>| {
+            let model = Model { rupture_times_s: times_s.clone(), ..model.clone() };
+            fit_from(&model, prepared.blocks.to_vec(), drops.clone())
+        };
+        rupture_times_s.iter().filter_map(at).min_by(|a, b| a.rms_n().total_cmp(&b.rms_n()))
     };
     let base = ScoredModel::new(ModelFamily::Base, on(&search.base.model)?, recordings);
     let library = (!search.best.model.effects.is_empty())
@@ -80,6 +90,20 @@ pub fn select_model(
     progress("testing the terms of the model");
     let parts = ablate(&mut best, recordings);
     Some(CandidateModels { base, library, slip, best, terms: parts })
+}
+
+/// The prior with the median elastic force at the ruptures of a fit as puncture force of each layer that ruptures in most recordings.
+fn with_forces_at_ruptures(prior: &Assumptions, fit: &Fit) -> Assumptions {
+    let mut out = prior.clone();
+    let events = &fit.residuals.ruptures;
+    for (l, layer) in out.tissue.layers.iter_mut().enumerate() {
+        let ruptured = events.iter().filter_map(|all| all.get(l).filter(|event| event.ruptured));
+        let forces_n: Vec<f64> = ruptured.map(|event| event.elastic_n).filter(|f| *f > 0.0).collect();
+        if 2 * forces_n.len() >= events.len() && layer.puncture_n.is_some() {
+            layer.puncture_n = Some(stylet_stats::median_of(forces_n));
+        }
+    }
+    out
 }
 
 /// Quantisation noise (N).
