@@ -57,9 +57,14 @@ pub struct StartValues {
     pub rupture_depth_m: Option<f64>,
 }
 
+/// Path (m) behind the assumed end of the tissue from which the needle counts as having left it, beyond the error of the contact.
+const LEFT_BEHIND_M: f64 = 1e-3;
+
 /// Geometry from the raw data; per layer, the load before its rupture and the indentation at that load.
 struct LayerGeometry {
     tissue: Tissue,
+    /// Whether the needle leaves the last layer.
+    leaves: bool,
     fronts_m: Vec<f64>,
     loads_n: Vec<f64>,
     indented_m: Vec<f64>,
@@ -93,10 +98,15 @@ fn layer_geometry(assumed: &Tissue, recordings: &[&SegmentedRecording], beyond_m
     let mut tissue = assumed.clone();
     tissue.surface_m = surface_m;
     let (mut loads_n, mut indented_m) = (Vec::new(), Vec::new());
+    let mut leaves = false;
     for (l, layer) in tissue.layers.iter_mut().enumerate() {
-        // Behind the last face there is no tissue, if the assumed one ends before the deepest point.
         if l + 1 < layers {
             layer.thickness_m = fronts_m[l + 1] - fronts_m[l];
+        } else {
+            leaves = fronts_m[l] + layer.thickness_m + LEFT_BEHIND_M < deepest;
+            if !leaves {
+                layer.thickness_m = layer.thickness_m.max(deepest - fronts_m[l] + 0.02);
+            }
         }
         // Friction of the layers above carries a part of the load of deeper layers.
         let share = if l == 0 { 1.0 } else { 0.6 };
@@ -110,7 +120,7 @@ fn layer_geometry(assumed: &Tissue, recordings: &[&SegmentedRecording], beyond_m
         loads_n.push(load);
         indented_m.push((at.unwrap_or(deepest) - fronts_m[l]).max(2e-3));
     }
-    LayerGeometry { tissue, fronts_m, loads_n, indented_m }
+    LayerGeometry { tissue, leaves, fronts_m, loads_n, indented_m }
 }
 
 /// Prior of an indentation without rupture: one linear spring.
@@ -124,7 +134,7 @@ pub fn indentation_prior(assumed: &Tissue, run: &SegmentedRecording) -> Assumpti
         layer.friction_ns_per_m2 = 0.0;
         layer.puncture_n = None;
     }
-    Assumptions { surface_tolerance_m: INDENTATION_SURFACE_SD_M, ..weak_prior(tissue) }
+    Assumptions { surface_tolerance_m: INDENTATION_SURFACE_SD_M, ..weak_prior(tissue, geometry.leaves) }
 }
 
 /// Prior of the base law: stiffness, friction and puncture force from the raw forces, which are accurate to a factor of a few.
@@ -138,20 +148,21 @@ pub fn base_law_prior(assumed: &Tissue, recordings: &[&SegmentedRecording]) -> A
         let ruptured = recordings.iter().filter(|r| r.ruptures_s[l].is_finite()).count();
         layer.stiffness_n_per_m = (load / x).max(1.0);
         layer.friction_ns_per_m2 = FRICTION_LOAD_SHARE * load / (speed * x);
-        layer.puncture_n = (2 * ruptured >= recordings.len()).then_some(load);
+        // A rupture below the threshold of a visible drop is expected where one is assumed.
+        layer.puncture_n = (2 * ruptured >= recordings.len()).then_some(load).or(layer.puncture_n);
     }
-    weak_prior(tissue)
+    weak_prior(tissue, geometry.leaves)
 }
 
-/// Weak prior about the parameters of a tissue.
-fn weak_prior(tissue: Tissue) -> Assumptions {
+/// Weak prior about the parameters of a tissue, which the needle `leaves` or not.
+fn weak_prior(tissue: Tissue, leaves: bool) -> Assumptions {
     let layers = tissue.layers.len();
     Assumptions {
         known_effects: Vec::new(),
         further_effects: Vec::new(),
         tolerance: vec![STIFFNESS_FACTOR; layers],
         thickness_tolerance: (0..layers)
-            .map(|l| if l + 1 < layers { RELATIVE_THICKNESS_SD } else { 0.0 })
+            .map(|l| if l + 1 < layers || leaves { RELATIVE_THICKNESS_SD } else { 0.0 })
             .collect(),
         surface_tolerance_m: SURFACE_SD_M,
         tissue,
@@ -170,7 +181,7 @@ fn first_time_above(run: &SegmentedRecording, force_n: f64) -> f64 {
 /// the shaft is as high as the load of the first layer, this layer may rupture without a drop, where the force first reaches the plateau.
 #[must_use]
 pub fn shaft_slip_start(assumed: &Tissue, recordings: &[&SegmentedRecording], guess: &StartValues) -> Model {
-    let LayerGeometry { mut tissue, fronts_m: fronts, loads_n, indented_m } =
+    let LayerGeometry { mut tissue, leaves, fronts_m: fronts, loads_n, indented_m } =
         layer_geometry(assumed, recordings, guess.surface_m);
     let days = group_by_speed_and_stroke(recordings);
     let one_speed = have_one_speed(recordings);
@@ -217,7 +228,7 @@ pub fn shaft_slip_start(assumed: &Tissue, recordings: &[&SegmentedRecording], gu
         effects.push(ReleaseDepth { layer: l + 1, depth_m }.into());
     }
     let layers = tissue.layers.len();
-    let belief = weak_prior(tissue);
+    let belief = weak_prior(tissue, leaves);
     let mut model = Model::base(Arc::new(belief), recordings.len());
     model.effects = effects.iter().map(|e| EffectTerm::new(e.info(), &e.parameters())).collect();
     model.tied = bound;

@@ -88,9 +88,13 @@ fn the_frame_uses_medians_over_recordings() {
         "{:?}",
         f.fronts_m
     );
-    // The needle may leave the last layer.
+    // The last layer reaches at least 20 mm beyond the deepest point, unless the needle leaves it.
     thin.layers[1].thickness_m = 1e-3;
-    assert_eq!(layer_geometry(&thin, &refs, 0.0).tissue.layers[1].thickness_m, 1e-3);
+    let f = layer_geometry(&thin, &refs, 0.0);
+    assert!((f.tissue.layers[1].thickness_m - 0.021).abs() < 1e-9 && !f.leaves, "{:?}", f.tissue);
+    thin.layers[0].thickness_m = 0.01;
+    let f = layer_geometry(&thin, &refs, 0.0);
+    assert!(f.tissue.layers[1].thickness_m == 1e-3 && f.leaves, "{:?}", f.tissue);
     // Loads have a lower limit of 5 % of the largest force.
     blank[0].loads_n = vec![Some(0.01), None];
     let refs: Vec<&SegmentedRecording> = blank.iter().collect();
