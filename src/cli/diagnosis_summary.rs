@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use stylet_diagnose::Diagnosis;
+use stylet_diagnose::diagnosis_json::FindingKind;
 use stylet_report::pages::diagnosis::{
     different_recordings, findings, general_forms, lower_limits, partial_model, proposed_formula,
     recording_differences, summary_sentence, undetermined_parameters, unneeded_custom_effects,
@@ -56,6 +57,9 @@ pub fn summary(d: &Diagnosis) -> String {
     }
     for sentence in findings(d) {
         let _ = writeln!(out, "  {sentence}");
+    }
+    if d.gain.recordings.len() > 2 && d.findings.iter().any(|finding| finding.kind == FindingKind::Scatter) {
+        let _ = writeln!(out, "  if the recordings repeat one insertion, diagnose them with --repeats");
     }
     for sentence in partial_model(d).into_iter().chain(proposed_formula(d)).chain(unneeded_custom_effects(d))
     {

@@ -238,10 +238,7 @@ fn scatter(d: &Diagnosis) -> Option<String> {
         }
     }
     (!what.is_empty()).then(|| {
-        format!(
-            "recordings differ too much for one model: {} (one standard deviation); if they repeat one insertion, diagnose them with --repeats",
-            what.join(", ")
-        )
+        format!("recordings differ too much for one model: {} (one standard deviation)", what.join(", "))
     })
 }
 
