@@ -38,6 +38,9 @@ pub fn diagnose(args: &DiagnoseArgs, file: &Path) -> Result<(), Failure> {
 pub fn diagnose_without_scenario(args: &DiagnoseArgs) -> Result<(), Failure> {
     let first = first_recording(&args.data)?;
     let folder = args.results.output_folder(first, "-diagnosis");
+    args.limits.check(first, &resource_estimate::estimate_diagnose_repeats(&args.data), true)?;
+    let read = args.results.inputs(first, args.data.iter().chain(&args.reading.columns));
+    check_folder(&folder, "diagnosis.json", &read)?;
     let inputs = args.reading.inputs(&folder.join(FOUND_FILE), &args.data, &[]);
     let name = first.file_stem().map_or_else(|| "phantom".to_owned(), |s| s.to_string_lossy().into_owned());
     let (scenario, set) = data_set_of_recordings(&name, &inputs)?;

@@ -180,6 +180,13 @@ impl RepeatsReport {
             study.mean_scenario.to_ron().map_err(Error::internal)?
         );
         let mut commands = format!("stylet diagnose {file}");
+        if let Some(columns) = &inputs.columns {
+            let _ = write!(commands, " --columns {}", columns.display());
+        }
+        // A data set implies it.
+        if !is_dataset(&inputs.scenario).unwrap_or(false) {
+            commands.push_str(" --repeats");
+        }
         if !inputs.data.is_empty() {
             let _ = write!(commands, " --data ...  # {} recordings", study.recordings.len());
         }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::column_map::ColumnMap;
 use crate::csv_reader::read_csv;
 use crate::error::RecordError;
 use crate::inspect::{Finding, InspectOptions, Inspection, Role};
@@ -13,7 +14,7 @@ use crate::table_source::ReadOptions;
 const MAX_BYTES: u64 = 32 << 20;
 
 /// [`inspect`](crate::inspect::inspect), and then the recording is read as a command would read it: with the map of `options`, or the proposed
-/// one if the file needs one. What the quality checks refuse becomes an obstacle. Where position or force run the other way, the proposed
+/// one if the file needs one. What the reader or the quality checks refuse becomes an obstacle. Where position or force run the other way, the proposed
 /// map reverses their signs. Files above 32 MB are not read.
 ///
 /// # Errors
@@ -28,20 +29,54 @@ pub fn inspect_and_read(path: impl AsRef<Path>, options: &InspectOptions) -> Res
         true => Some(inspection.map.clone()),
         false => options.columns.clone(),
     };
-    // What cannot be read is an obstacle already, or needs a repair.
-    let Ok((recording, notes)) = read_csv(path, &ReadOptions { columns, repair: false }) else {
-        return Ok(inspection);
+    let obstacle = |message: String| Finding { kind: "quality", message, line: None, obstacle: true };
+    let read = |columns: Option<ColumnMap>| read_csv(path, &ReadOptions { columns, repair: false });
+    let blocking =
+        |notes: Vec<QualityNote>| notes.into_iter().filter(|note| note.blocking).collect::<Vec<_>>();
+    let (recording, refused) = match read(columns.clone()) {
+        Ok((recording, notes)) => (recording, blocking(notes)),
+        Err(error) => {
+            if inspection.is_readable() {
+                inspection.findings.insert(0, obstacle(error.to_string()));
+            }
+            return Ok(inspection);
+        }
     };
-    let refused: Vec<QualityNote> = notes.into_iter().filter(|note| note.blocking).collect();
-    for (role, sign) in [Role::Position, Role::Force].into_iter().zip(reversed(&recording, &refused)) {
-        if sign {
-            inspection.reverse(role);
+    if refused.is_empty() {
+        return Ok(inspection);
+    }
+    let is_accepted =
+        |map: &ColumnMap| read(Some(map.clone())).is_ok_and(|(_, notes)| blocking(notes).is_empty());
+    if columns.is_none() && is_accepted(&inspection.map) {
+        // The map has another unit than the file states.
+        inspection.map_needed = true;
+    } else {
+        let mut other = inspection.clone();
+        for (role, sign) in [Role::Position, Role::Force].into_iter().zip(reversed(&recording, &refused)) {
+            if sign {
+                other.reverse(role, columns.is_none().then(|| inspection.stated_scale(role)));
+            }
+        }
+        if is_accepted(&other.map) {
+            inspection = other;
         }
     }
-    let obstacle =
-        |note: QualityNote| Finding { kind: "quality", message: note.message, line: None, obstacle: true };
-    inspection.findings.splice(0..0, refused.into_iter().map(obstacle));
+    inspection.findings.splice(0..0, refused.into_iter().map(|note| obstacle(note.message)));
     Ok(inspection)
+}
+
+/// Largest force at the start, as a share of its range, of a recording that begins in air.
+const MAX_START_SHARE: f64 = 0.2;
+/// Samples of the start.
+const START_SAMPLES: usize = 20;
+
+/// Whether the force begins at zero. That of a retraction from inside the tissue does not.
+fn begins_unloaded(recording: &Recording) -> bool {
+    let force = &recording.force_n;
+    let low = force.iter().copied().fold(0.0, f64::min);
+    let high = force.iter().copied().fold(0.0, f64::max);
+    let start = stylet_stats::mean(&force[..force.len().min(START_SAMPLES)]);
+    start.abs() <= MAX_START_SHARE * (high - low)
 }
 
 /// Whether position and force must be reversed for the recording to be accepted.
@@ -51,7 +86,7 @@ fn reversed(recording: &Recording, refused: &[QualityNote]) -> [bool; 2] {
             QualityKind::Reversed => &[[false, true]],
             QualityKind::ReversedPosition => &[[true, false], [true, true]],
             // A retraction with both signs reversed would look like an insertion.
-            QualityKind::OnlyRetraction => &[[true, false]],
+            QualityKind::OnlyRetraction if begins_unloaded(recording) => &[[true, false]],
             _ => &[],
         },
         _ => &[],

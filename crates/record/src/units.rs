@@ -322,12 +322,15 @@ fn separated(name: &str) -> String {
 
 /// Whether a name has one of these words, with or without a number behind it; a word of four letters may be a part of another one.
 fn has_word(name: &str, list: &[&str]) -> bool {
-    let lower = separated(name).to_lowercase();
+    has_word_of(&name.to_lowercase(), list) || has_word_of(&separated(name).to_lowercase(), list)
+}
+
+fn has_word_of(lower: &str, list: &[&str]) -> bool {
     let mut words = lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
     words.any(|word| {
         let stem = word.trim_end_matches(|c: char| c.is_ascii_digit());
         let is_part =
-            |known: &&str| known.chars().count() >= 4 && (word.starts_with(*known) || word.ends_with(*known));
+            |known: &&str| known.chars().count() >= 4 && (word.starts_with(*known) || stem.ends_with(*known));
         list.contains(&word) || list.contains(&stem) || list.iter().any(is_part)
     })
 }
@@ -357,20 +360,23 @@ pub(crate) fn vector_of(name: &str) -> Option<String> {
 /// Dimension of the quantity that a name without unit denotes.
 #[must_use]
 pub fn quantity_of(base: &str) -> Option<Dimension> {
-    let has = |list: &[&str]| has_word(base, list);
     // `wrench.force.z` is a force, `pose.position.z` a position, `joint_velocity` a velocity.
-    if has(OTHER_WORDS) {
+    if has_word(base, OTHER_WORDS) {
         return None;
     }
-    [
-        (FORCE_WORDS, Dimension::Force),
-        (VELOCITY_WORDS, Dimension::Velocity),
-        (LENGTH_WORDS, Dimension::Length),
-        (TIME_WORDS, Dimension::Time),
-    ]
-    .into_iter()
-    .find(|(list, _)| has(list))
-    .map(|(_, dimension)| dimension)
+    let find = |lower: &str| {
+        [
+            (FORCE_WORDS, Dimension::Force),
+            (VELOCITY_WORDS, Dimension::Velocity),
+            (LENGTH_WORDS, Dimension::Length),
+            (TIME_WORDS, Dimension::Time),
+        ]
+        .into_iter()
+        .find(|(list, _)| has_word_of(lower, list))
+        .map(|(_, dimension)| dimension)
+    };
+    // The letter before `fPosition` is a type.
+    find(&base.to_lowercase()).or_else(|| find(&separated(base).to_lowercase()))
 }
 
 #[cfg(test)]
@@ -411,6 +417,9 @@ mod tests {
         assert_eq!(quantity_of("wrench.torque.z"), None);
         assert_eq!(quantity_of("cartForce1_Z"), Some(Dimension::Force));
         assert_eq!(quantity_of("cartPosMsr1_X"), Some(Dimension::Length));
+        assert_eq!(quantity_of("fPosition"), Some(Dimension::Length));
+        assert_eq!(quantity_of("CrossHead"), quantity_of("crosshead"));
+        assert!(is_commanded("PositionSetPoint"));
         assert_eq!(quantity_of("/ft_sensor/wrench.wrench.force.z"), Some(Dimension::Force));
         assert_eq!(quantity_of("Przemieszczenie"), Some(Dimension::Length));
     }

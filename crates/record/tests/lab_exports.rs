@@ -287,7 +287,7 @@ fn marks_of_meters_and_spreadsheets_are_missing_values() {
     }
 }
 
-/// 200 rows from ten seconds before midnight; dates of a spreadsheet as days.
+/// 200 rows from one second before midnight; dates of a spreadsheet as days.
 #[test]
 fn times_of_day_pass_midnight_and_days_are_proposed_for_the_numbers_of_a_spreadsheet() {
     let clock = |s: f64| {
@@ -324,5 +324,19 @@ fn an_inspection_reads_the_file_and_reverses_signs_that_run_the_other_way() {
         let options = InspectOptions { columns: Some(found.map) };
         assert!(stylet_record::inspect_and_read(&path, &options).expect("a table").is_readable());
     }
+    // Millimetres under a name in metres: the proposed map has the unit that the magnitude suggests.
+    let inspected = |rows: String| {
+        std::fs::write(&path, rows).expect("written");
+        stylet_record::inspect_and_read(&path, &InspectOptions::default()).expect("a table")
+    };
+    let found = inspected(text("time_s,position_m,force_n\n", |k, [t, z, f]| {
+        format!("{t},{},{}", 20.0 * z, f + 1e-3 * (k % 7) as f64)
+    }));
+    assert!(!found.is_readable() && found.map_needed && found.map.position.scale == Some(1e-3), "{found:?}");
+    // A retraction alone is no insertion with another sign.
+    let found = inspected(text("time_s,position_mm,force_n\n", |k, [t, z, _]| {
+        format!("{t},{},{}", 20.0 - z, -1.5 * (1.0 - t / 2.0) + 1e-2 * ((k * 7919) % 13) as f64 / 13.0)
+    }));
+    assert!(!found.is_readable() && !found.map_needed, "{found:?}");
     std::fs::remove_dir_all(&folder).expect("removed");
 }

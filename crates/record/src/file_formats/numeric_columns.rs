@@ -29,7 +29,7 @@ pub(crate) type NamedValues = (String, Vec<f64>);
 pub(crate) fn column_samples(head: TableHead<'_>, values: &[NamedValues]) -> Vec<ColumnSample> {
     let sample = |(at, name): (usize, &String)| {
         let (_, column) = values.iter().find(|(of, _)| of == name)?;
-        Some(ColumnSample::of_extremes(column, unit_of(head, at)?.to_si))
+        Some(ColumnSample::of_values(column, unit_of(head, at)?.to_si))
     };
     head.names.iter().enumerate().map(|column| sample(column).unwrap_or_default()).collect()
 }

@@ -1,6 +1,6 @@
 //! Columns for time, position and force: as the readers find them, otherwise as suggested by contents and magnitudes.
 
-use super::magnitude::{EPOCH_S, epoch_unit, is_implausible, propose_units};
+use super::magnitude::{EPOCH_S, epoch_unit, is_implausible, may_be_days, propose_units};
 use super::scan::{ColumnScan, Scan};
 use super::{Candidate, Role, UnitProposal};
 use crate::column_map::{Column, ColumnMap};
@@ -238,7 +238,9 @@ impl Chosen {
             proposals.push(UnitProposal { unit: unit.to_owned(), scale, value: first_time });
         } else if unit.is_none() || is_implausible(role.dimension(), magnitude * found.scale) {
             let all = propose_units(role.dimension(), magnitude);
-            if is_implausible(role.dimension(), magnitude * found.scale) {
+            if is_implausible(role.dimension(), magnitude * found.scale)
+                || may_be_days(role.dimension(), magnitude)
+            {
                 if let Some(best) = all.first() {
                     found.scale = best.scale;
                     reason.push_str(&format!("; the magnitude suggests {}", best.unit));

@@ -83,9 +83,15 @@ pub fn is_implausible(dimension: Dimension, magnitude: f64) -> bool {
     match dimension {
         Dimension::Length => magnitude > TRAVELS_M.1,
         Dimension::Force => magnitude > FORCES_N.1 / 5.0,
-        Dimension::Time => magnitude > 0.0 && !(INTERVALS_S.0..=INTERVALS_S.1).contains(&magnitude),
+        Dimension::Time => magnitude > INTERVALS_S.1,
         Dimension::Velocity | Dimension::Other => false,
     }
+}
+
+/// Whether a sampling interval is so short in seconds that it may be in days.
+#[must_use]
+pub(super) fn may_be_days(dimension: Dimension, magnitude: f64) -> bool {
+    dimension == Dimension::Time && magnitude > 0.0 && magnitude < INTERVALS_S.0
 }
 
 /// The proposals as words: `gram-force (scale 0.00980665, 4.9 N) or mN (scale 0.001, 0.5 N)`.

@@ -61,22 +61,29 @@ impl Inspection {
         self.candidates.iter().find(|candidate| candidate.role == role)
     }
 
-    /// Reverses the sign of a quantity in the proposed map and in the curves.
-    pub(crate) fn reverse(&mut self, role: Role) {
+    /// Reverses the sign of a quantity in the proposed map and in the curves. `scale` is the one that it had; `None` for that of the map.
+    pub(crate) fn reverse(&mut self, role: Role, scale: Option<f64>) {
         let (column, curve) = match role {
             Role::Position => (&mut self.map.position, &mut self.curves.position_m),
             Role::Force => (&mut self.map.force, &mut self.curves.force_n),
             Role::Time | Role::Velocity => return,
         };
+        let Some(candidate) = self.candidates.iter_mut().find(|candidate| candidate.role == role) else {
+            return;
+        };
+        candidate.scale = -scale.unwrap_or(candidate.scale);
+        candidate.certain = false;
+        candidate.reason.push_str("; the sign is reversed");
+        (column.scale, column.offset) = (Some(candidate.scale), -column.offset);
         curve.iter_mut().for_each(|x| *x = -*x);
-        column.offset = -column.offset;
-        if let Some(candidate) = self.candidates.iter_mut().find(|candidate| candidate.role == role) {
-            candidate.scale = -candidate.scale;
-            column.scale = Some(candidate.scale);
-            candidate.certain = false;
-            candidate.reason.push_str("; the sign is reversed");
-        }
         self.map_needed = true;
+    }
+
+    /// SI units per unit of a quantity, as its column says.
+    pub(crate) fn stated_scale(&self, role: Role) -> f64 {
+        let number = self.candidate(role).and_then(|candidate| candidate.columns.first());
+        let column = number.and_then(|number| self.columns.get(number.checked_sub(1)?));
+        column.and_then(|column| column.to_si).unwrap_or(1.0)
     }
 
     /// The proposed map as a RON file, with remarks.

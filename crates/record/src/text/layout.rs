@@ -31,21 +31,22 @@ pub(crate) struct ColumnSample {
     pub is_date: bool,
 }
 
+/// Values of a column that is not read as text.
+const SPREAD_VALUES: usize = 512;
 /// Share of rising steps of a clock; the others repeat a stamp.
 const CLOCK_SHARE: f64 = 0.9;
 
 impl ColumnSample {
-    /// A column of a file that is no text: its extremes in SI units, of values in units of `to_si`.
-    pub(crate) fn of_extremes(values: &[f64], to_si: f64) -> Self {
-        let known = || values.iter().map(|x| x * to_si).filter(|x| x.is_finite());
-        let (low, high) = (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
-        Self { spread: vec![low, high], ..Self::default() }
+    /// A column of a file that is no text, with values in units of `to_si`.
+    pub(crate) fn of_values(values: &[f64], to_si: f64) -> Self {
+        let step = (values.len() / SPREAD_VALUES).max(1);
+        Self { spread: values.iter().step_by(step).map(|x| x * to_si).collect(), ..Self::default() }
     }
 
-    /// Largest less smallest value.
+    /// Largest less smallest value; NaN without values.
     pub(crate) fn range(&self) -> f64 {
         let known = || self.spread.iter().copied().filter(|x| x.is_finite());
-        (known().fold(f64::NEG_INFINITY, f64::max) - known().fold(f64::INFINITY, f64::min)).max(0.0)
+        known().fold(f64::NAN, f64::max) - known().fold(f64::NAN, f64::min)
     }
 
     /// Whether every sample has a stamp of its own, with few exceptions.
@@ -390,8 +391,12 @@ fn header(all: &[Line<'_>], first: usize, block: &Block, hints: LayoutHints) -> 
     let has_letters = |fields: &[String]| fields.iter().any(|f| f.chars().any(char::is_alphabetic));
     // Below names and units there may be a row of channels, which is neither.
     let is_row_of_channels = |place: usize| match &above[place..] {
-        [_, (_, units), (_, names), ..] => {
-            fits(units) && is_row_of_units(units) && fits(names) && has_letters(names)
+        [(_, channels), (_, units), (_, names), ..] => {
+            fits(units)
+                && is_row_of_units(units)
+                && fits(names)
+                && has_letters(names)
+                && channels.iter().all(|name| quantity_of(&split_name(name).base).is_none())
         }
         _ => false,
     };
