@@ -308,21 +308,24 @@ const FURTHER_OTHER_WORDS: &[&str] =
 const VELOCITY_WORDS: &[&str] =
     &["velocity", "vel", "speed", "v", "vz", "geschwindigkeit", "vitesse", "prędkość", "velocidad"];
 
-/// The words of `cartForce1` separated.
-fn separated(name: &str) -> String {
-    let all: Vec<char> = name.chars().collect();
-    let begins = |at: usize| {
-        at > 0
-            && all[at].is_uppercase()
-            && all[at - 1].is_lowercase()
-            && all.get(at + 1).is_some_and(|c| c.is_lowercase())
-    };
-    (0..all.len()).flat_map(|at| begins(at).then_some(' ').into_iter().chain([all[at]])).collect()
+/// The words of `cartForce1` separated, in lower case; `None` for a name without a capital inside a word.
+fn separated(name: &str) -> Option<String> {
+    let is_start =
+        |w: &[u8]| w[0].is_ascii_lowercase() && w[1].is_ascii_uppercase() && w[2].is_ascii_lowercase();
+    let starts = name.as_bytes().windows(3).enumerate().filter(|(_, w)| is_start(w)).map(|(at, _)| at + 1);
+    let mut out = String::new();
+    let mut from = 0;
+    for start in starts {
+        out.push_str(&name[from..start]);
+        out.push(' ');
+        from = start;
+    }
+    (from > 0).then(|| (out + &name[from..]).to_lowercase())
 }
 
 /// Whether a name has one of these words, with or without a number behind it; a word of four letters may be a part of another one.
 fn has_word(name: &str, list: &[&str]) -> bool {
-    has_word_of(&name.to_lowercase(), list) || has_word_of(&separated(name).to_lowercase(), list)
+    has_word_of(&name.to_lowercase(), list) || separated(name).is_some_and(|words| has_word_of(&words, list))
 }
 
 fn has_word_of(lower: &str, list: &[&str]) -> bool {
@@ -376,7 +379,7 @@ pub fn quantity_of(base: &str) -> Option<Dimension> {
         .map(|(_, dimension)| dimension)
     };
     // The letter before `fPosition` is a type.
-    find(&base.to_lowercase()).or_else(|| find(&separated(base).to_lowercase()))
+    find(&base.to_lowercase()).or_else(|| find(&separated(base)?))
 }
 
 #[cfg(test)]
