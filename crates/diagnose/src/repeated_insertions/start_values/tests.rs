@@ -121,10 +121,14 @@ fn the_base_law_prior_has_a_puncture_force_where_most_recordings_rupture() {
         (b.tolerance, b.thickness_tolerance, b.surface_tolerance_m),
         (vec![4.0; 2], vec![0.2, 0.0], 1.5e-3)
     );
-    // Ruptures in less than half of the recordings: no puncture force.
+    // Ruptures in less than half of the recordings: the assumed puncture force, if there is one.
     all[2].ruptures_s[1] = NO_RUPTURE;
     let refs: Vec<&SegmentedRecording> = all.iter().collect();
-    assert_eq!(base_law_prior(&assumed(), &refs).tissue.layers[1].puncture_n, None);
+    let mut other = assumed();
+    for puncture_n in [Some(7.0), None] {
+        other.layers[1].puncture_n = puncture_n;
+        assert_eq!(base_law_prior(&other, &refs).tissue.layers[1].puncture_n, puncture_n);
+    }
     let six = [&refs[..], &[&all[3], &all[3]]].concat();
     assert!(base_law_prior(&assumed(), &six).tissue.layers[1].puncture_n.is_some());
     let p = indentation_prior(&assumed(), &all[3]);
