@@ -12,6 +12,10 @@ use crate::table_source::ReadOptions;
 
 /// Largest file that is read as a whole for the check.
 const MAX_BYTES: u64 = 32 << 20;
+/// Largest force at the start, as a share of its range, of a recording that begins in air.
+const MAX_START_SHARE: f64 = 0.2;
+/// Samples of the start.
+const START_SAMPLES: usize = 20;
 
 /// [`inspect`](crate::inspect::inspect), and then the recording is read as a command would read it: with the map of `options`, or the proposed
 /// one if the file needs one. What the reader or the quality checks refuse becomes an obstacle. Where position or force run the other way, the proposed
@@ -51,24 +55,20 @@ pub fn inspect_and_read(path: impl AsRef<Path>, options: &InspectOptions) -> Res
         // The map has another unit than the file states.
         inspection.map_needed = true;
     } else {
+        let signs = reversed(&recording, &refused);
         let mut other = inspection.clone();
-        for (role, sign) in [Role::Position, Role::Force].into_iter().zip(reversed(&recording, &refused)) {
+        for (role, sign) in [Role::Position, Role::Force].into_iter().zip(signs) {
             if sign {
                 other.reverse(role, columns.is_none().then(|| inspection.stated_scale(role)));
             }
         }
-        if is_accepted(&other.map) {
+        if signs.contains(&true) && is_accepted(&other.map) {
             inspection = other;
         }
     }
     inspection.findings.splice(0..0, refused.into_iter().map(|note| obstacle(note.message)));
     Ok(inspection)
 }
-
-/// Largest force at the start, as a share of its range, of a recording that begins in air.
-const MAX_START_SHARE: f64 = 0.2;
-/// Samples of the start.
-const START_SAMPLES: usize = 20;
 
 /// Whether the force begins at zero. That of a retraction from inside the tissue does not.
 fn begins_unloaded(recording: &Recording) -> bool {

@@ -84,6 +84,12 @@ fn removal_candidates(model: &Model, events: &[Vec<RuptureEvent>]) -> Vec<(&'sta
     out
 }
 
+/// Elastic forces (N) of a layer (0-based) at its ruptures, of the recordings in which it ruptured.
+pub(super) fn elastic_forces_at_ruptures_n(events: &[Vec<RuptureEvent>], layer: usize) -> Vec<f64> {
+    let ruptured = events.iter().filter_map(|e| e.get(layer).filter(|e| e.ruptured));
+    ruptured.map(|e| e.elastic_n).filter(|f| *f > 0.0).collect()
+}
+
 /// The model without the effects `id`. A layer that had a delayed puncture gets its observed rupture force as puncture force.
 pub(super) fn without_effect(model: &Model, events: &[Vec<RuptureEvent>], id: &str) -> Model {
     let mut out = model.clone();
@@ -101,8 +107,7 @@ pub(super) fn without_effect(model: &Model, events: &[Vec<RuptureEvent>], id: &s
     while let Some(k) = out.effects.iter().position(|c| c.info.id == id) {
         if let Some(AnyEffect::DelayedPuncture(delayed)) = out.effects[k].effect() {
             let layer = delayed.layer.saturating_sub(1);
-            let ruptured = events.iter().filter_map(|e| e.get(layer).filter(|e| e.ruptured));
-            let forces_n: Vec<f64> = ruptured.map(|e| e.elastic_n).filter(|f| *f > 0.0).collect();
+            let forces_n = elastic_forces_at_ruptures_n(events, layer);
             let force_n = stylet_stats::median_of(forces_n.iter().copied());
             if forces_n.len() > 1 {
                 out.scatter.rupture_force =

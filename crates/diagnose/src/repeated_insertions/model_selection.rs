@@ -1,6 +1,6 @@
 //! Selects the model of repeated recordings by cross-validation: base law, base law with library effects, or stick-slip of the shaft.
 
-use super::ablation::{ModelTerm, ablate};
+use super::ablation::{ModelTerm, ablate, elastic_forces_at_ruptures_n};
 use super::multistart_fit::{fit_from, set_blocks};
 use super::scored_model::{ModelFamily, ScoredModel, active_effects};
 use super::segmented_recording::{SegmentedRecording, group_by_speed_and_stroke};
@@ -92,13 +92,12 @@ pub fn select_model(
     Some(CandidateModels { base, library, slip, best, terms: parts })
 }
 
-/// The prior with the median elastic force at the ruptures of a fit as puncture force of each layer that ruptures in most recordings.
+/// The prior with the median elastic force at the ruptures of a fit as puncture force of each layer that ruptures in at least half of the recordings.
 fn with_forces_at_ruptures(prior: &Assumptions, fit: &Fit) -> Assumptions {
     let mut out = prior.clone();
     let events = &fit.residuals.ruptures;
     for (l, layer) in out.tissue.layers.iter_mut().enumerate() {
-        let ruptured = events.iter().filter_map(|all| all.get(l).filter(|event| event.ruptured));
-        let forces_n: Vec<f64> = ruptured.map(|event| event.elastic_n).filter(|f| *f > 0.0).collect();
+        let forces_n = elastic_forces_at_ruptures_n(events, l);
         if 2 * forces_n.len() >= events.len() && layer.puncture_n.is_some() {
             layer.puncture_n = Some(stylet_stats::median_of(forces_n));
         }

@@ -31,7 +31,7 @@ pub(crate) struct ColumnSample {
     pub is_date: bool,
 }
 
-/// Values of a column that is not read as text.
+/// Least number of values in the sample of a longer column that is not read as text.
 const SPREAD_VALUES: usize = 512;
 /// Share of rising steps of a clock; the others repeat a stamp.
 const CLOCK_SHARE: f64 = 0.9;
