@@ -13,6 +13,7 @@ use stylet_api::diagnose_repeats::{
 use stylet_api::diagnose_specimens::{SpecimensReport, diagnose_specimens};
 use stylet_api::output_folder::check_folder;
 use stylet_api::resource_estimate;
+use stylet_diagnose::diagnosis_json::{Finding, FindingKind, Verdict};
 use stylet_diagnose::repeated_insertions::dataset::Dataset;
 use stylet_diagnose::repeated_insertions::diagnose_set::SetDiagnosis;
 use stylet_record::QualityKind;
@@ -41,6 +42,7 @@ pub fn diagnose_without_scenario(args: &DiagnoseArgs) -> Result<(), Failure> {
     args.limits.check(first, &resource_estimate::estimate_diagnose_repeats(&args.data), true)?;
     let read = args.results.inputs(first, args.data.iter().chain(&args.reading.columns));
     check_folder(&folder, "diagnosis.json", &read)?;
+    check_folder(&folder, FOUND_FILE, &read)?;
     let inputs = args.reading.inputs(&folder.join(FOUND_FILE), &args.data, &[]);
     let name = first.file_stem().map_or_else(|| "phantom".to_owned(), |s| s.to_string_lossy().into_owned());
     let (scenario, set) = data_set_of_recordings(&name, &inputs)?;
@@ -92,6 +94,11 @@ fn summary(study: &SetDiagnosis) -> String {
     let _ = writeln!(out, "{}\n", summary_sentence(study));
     if let Some(grade) = &d.grade {
         let _ = writeln!(out, "  {}", grade.sentence());
+    }
+    // Otherwise they are in the first sentence.
+    let is_listed = |f: &&Finding| f.kind == FindingKind::OutOfTolerance && d.verdict != Verdict::Parameters;
+    for finding in d.findings.iter().filter(is_listed) {
+        let _ = writeln!(out, "  {}", finding.message);
     }
     let _ = writeln!(
         out,

@@ -11,6 +11,8 @@ use stylet_diagnose::Diagnosis;
 
 /// File with the layers that the diagnosis started from.
 pub(super) const FOUND_FILE: &str = "assumed.ron";
+/// The found layers and effects as a scenario.
+const PHANTOM_FILE: &str = "phantom.ron";
 /// Begins the summary.
 pub(super) const NO_SCENARIO: &str =
     "No scenario was given: the layers are those that the recordings show.\n";
@@ -72,7 +74,9 @@ fn run(
     let folder = args.results.output_folder(first, "-phantom");
     let inputs = args.reading.inputs(&folder.join(FOUND_FILE), &args.data, &[]);
     let read = args.results.inputs(first, args.data.iter().skip(1).chain(&args.reading.columns));
-    check_folder(&folder, "diagnosis.json", &read)?;
+    for result in ["diagnosis.json", FOUND_FILE, PHANTOM_FILE] {
+        check_folder(&folder, result, &read)?;
+    }
     let recordings = inputs.read_recordings()?;
     let name = first.file_stem().map_or_else(|| "phantom".to_owned(), |s| s.to_string_lossy().into_owned());
     let limit = args.limits.start_time_limit(first);
@@ -82,7 +86,7 @@ fn run(
     let mut output = found.output(&scenario, &inputs)?;
     output.add(FOUND_FILE, scenario.to_ron().map_err(stylet_api::Error::internal)?);
     let text = phantom_ron(&found, &args.data)?;
-    output.add("phantom.ron", text.clone());
+    output.add(PHANTOM_FILE, text.clone());
     let output = output.with_inputs(read);
     args.results.write_and_print(&folder, &output, || summary(&found.diagnosis))?;
     if let Some(phantom) = phantom {

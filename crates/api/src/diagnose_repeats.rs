@@ -75,23 +75,25 @@ pub fn load_data_set(inputs: &DiagnosisInputs) -> Result<Dataset, Error> {
 pub fn data_set_of_recordings(name: &str, inputs: &DiagnosisInputs) -> Result<(Scenario, Dataset), Error> {
     let recordings = usable_recordings(&inputs.read_recordings()?)?;
     let scenario = stylet_diagnose::scenario_from_recordings(name, &recordings, None)?;
-    let mut set = data_set_of(scenario.clone());
+    // Its numbers come from the recordings: there is nothing to compare.
+    let mut set = Dataset { scenario: None, ..data_set_of(scenario.clone()) };
     apply_reading(&mut set, inputs)?;
     Ok((scenario, set))
 }
 
 fn data_set_of(scenario: Scenario) -> Dataset {
     Dataset {
-        name: scenario.name,
-        source: scenario.source,
+        name: scenario.name.clone(),
+        source: scenario.source.clone(),
         columns: None,
-        tissue: scenario.tissue,
+        tissue: scenario.tissue.clone(),
         recordings: Vec::new(),
         split_by: Vec::new(),
         air: None,
         load: None,
         parts: Vec::new(),
         repair: false,
+        scenario: Some(scenario),
     }
 }
 
@@ -151,6 +153,9 @@ pub fn diagnose_repeats(
     let mut study = diagnose_set(&set.name, &set.tissue, &refs, &checks, &mut *progress)
         .ok_or_else(|| Error::internal("no model could be fitted to these recordings"))?;
     progress("model selection without parts of the set");
+    if let Some(scenario) = &set.scenario {
+        study.compare_with_scenario(scenario);
+    }
     study.run_nested_cross_validation();
     if !set.parts.is_empty() {
         progress("composition of layers measured separately");

@@ -172,11 +172,18 @@ pub(crate) fn compare_with_scenario(parameters: &mut [BaseParameter], scenario: 
             ("friction_ns_per_m2", Some(l)) => {
                 (l.friction_ns_per_m2, scenario.tolerance * l.friction_ns_per_m2)
             }
-            ("puncture_n", Some(l)) => {
+            // Sets have a puncture force of every layer, also of one that the scenario gives none.
+            ("puncture_n", Some(l)) if l.puncture_n.is_some() || b.assumed > 0.0 => {
                 let assumed = l.puncture_n.unwrap_or(b.assumed);
                 (assumed, scenario.tolerance * assumed)
             }
             ("thickness_m", Some(l)) => (l.thickness_m, scenario.thickness_tolerance * l.thickness_m),
+            // The front of the first layer is the surface.
+            ("front_m", Some(_)) if b.layer > 1 => {
+                let front_m = scenario.tissue.front_m(b.layer - 1);
+                let depth_m = front_m - scenario.tissue.surface_m;
+                (front_m, scenario.surface_tolerance_m + scenario.thickness_tolerance * depth_m)
+            }
             ("surface_m", _) => (scenario.tissue.surface_m, scenario.surface_tolerance_m),
             _ => continue,
         };
@@ -199,10 +206,12 @@ fn out_of_tolerance(b: &BaseParameter) -> String {
         "puncture" => "puncture force",
         what => what,
     };
+    let is_position = b.layer == 0 || b.name == "front_m";
+    let of_layer = if b.layer > 0 { format!(" of layer {}", b.layer) } else { String::new() };
     let of =
-        if b.layer > 0 { format!("{what} of layer {}", b.layer) } else { format!("position of the {what}") };
+        if is_position { format!("position of the {what}{of_layer}") } else { what.to_owned() + &of_layer };
     let number = |x: f64| significant(scale * x, 3);
-    let off = if b.layer == 0 {
+    let off = if is_position {
         format!("off by {} mm", number((b.value - b.assumed).abs()))
     } else {
         let (factor, word) =

@@ -47,13 +47,27 @@ fn the_effects_of_a_known_model_and_the_scatter_are_found() {
 #[test]
 fn a_true_base_law_has_no_cause() {
     let recordings = base_law_set(11);
-    let s = diagnose(&recordings);
+    let mut s = diagnose(&recordings);
     let named: Vec<&str> = s.diagnosis.causes.iter().map(|c| c.effect.as_str()).collect();
     println!("{named:?} {:?}", s.report.mean);
     compare_answers(&s);
     assert_eq!(s.diagnosis.verdict, Verdict::None, "{named:?}");
     let m = &s.report.mean;
     assert!(m.with_discrepancy_n <= 1.1 * m.floor_n.expect("four of each speed"), "{m:?}");
+
+    // A scenario with these numbers is right; where one is far off, it is named, and no other.
+    let mut scenario = s.mean_scenario.clone();
+    s.compare_with_scenario(&scenario);
+    assert_eq!(s.diagnosis.verdict, Verdict::None, "{:?}", s.diagnosis.findings);
+    scenario.tissue.layers[0].friction_ns_per_m2 *= 3.0;
+    s.compare_with_scenario(&scenario);
+    let messages: Vec<&str> = s.diagnosis.findings.iter().map(|f| f.message.as_str()).collect();
+    assert_eq!(s.diagnosis.verdict, Verdict::Parameters, "{messages:?}");
+    assert!(
+        messages.len() == 1
+            && messages[0].starts_with("the assumed friction of layer 1 is 3 times too large"),
+        "{messages:?}"
+    );
 }
 
 #[test]

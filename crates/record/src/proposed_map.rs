@@ -19,7 +19,7 @@ const START_SAMPLES: usize = 20;
 
 /// [`inspect`](crate::inspect::inspect), and then the recording is read as a command would read it: with the map of `options`, or the proposed
 /// one if the file needs one. What the reader or the quality checks refuse becomes an obstacle. Where position or force run the other way, the proposed
-/// map reverses their signs. Files above 32 MB are not read.
+/// map reverses their signs. Files above 32 MB are not read; a remark says so.
 ///
 /// # Errors
 /// As [`inspect`](crate::inspect::inspect).
@@ -27,6 +27,13 @@ pub fn inspect_and_read(path: impl AsRef<Path>, options: &InspectOptions) -> Res
     let path = path.as_ref();
     let mut inspection = crate::inspect::inspect(path, options)?;
     if inspection.bytes > MAX_BYTES {
+        let message = "the file is larger than 32 MB: what a command checks of its samples (signs, units, pauses) was not checked";
+        inspection.findings.push(Finding {
+            kind: "large_file",
+            message: message.to_owned(),
+            line: None,
+            obstacle: false,
+        });
         return Ok(inspection);
     }
     let columns = match inspection.map_needed {

@@ -305,6 +305,27 @@ fn times_of_day_pass_midnight_and_days_are_proposed_for_the_numbers_of_a_spreads
 }
 
 #[test]
+fn the_position_of_a_pose_in_matrix_form_is_its_translation() {
+    for by_columns in [true, false] {
+        let elements = |z: f64| {
+            let rows = [
+                [1.0, 0.0, 0.0, 0.3],
+                [0.0, -1.0, 0.0, 0.1],
+                [0.0, 0.0, -1.0, 1e-3 * z],
+                [0.0, 0.0, 0.0, 1.0],
+            ];
+            (0..16).map(move |k| if by_columns { rows[k % 4][k / 4] } else { rows[k / 4][k % 4] })
+        };
+        let head: Vec<String> = (0..16).map(|k| format!("O_T_EE[{k}]")).collect();
+        let text = text(&format!("time,{},force\n", head.join(",")), |_, [t, z, f]| {
+            let pose: Vec<String> = elements(z).map(|x| x.to_string()).collect();
+            format!("{t},{},{f}", pose.join(","))
+        });
+        assert_is_the_insertion(&read_as_proposed(&text));
+    }
+}
+
+#[test]
 fn an_inspection_reads_the_file_and_reverses_signs_that_run_the_other_way() {
     let folder = std::env::temp_dir().join(format!("stylet-signs-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder");

@@ -22,7 +22,8 @@ impl<const N: usize> NormalEquations<N> {
     /// Adds an observation `y`; of the row only the regressors in use count.
     #[inline]
     pub fn add(&mut self, row: &[f64; N], y: f64) {
-        for a in 0..self.size {
+        // Rows may be sparse: a needle is in few layers at a time.
+        for a in (0..self.size).filter(|a| row[*a] != 0.0) {
             self.moments[a] += row[a] * y;
             for b in 0..=a {
                 self.products[a][b] += row[a] * row[b];

@@ -5,7 +5,7 @@ use crate::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Files of each command, by its result file; checked before a long computation. The set itself is checked when it is written.
+/// Files of commands that write several, by the result file; checked before a long computation. The set itself is checked when it is written.
 const FILES: [(&str, &[&str]); 10] = [
     ("score.json", &["recording.csv", "score.json", "scenario.ron", "figure.svg", "report.html"]),
     ("enhance.json", &["enhance.json", "events.json", "figure.svg", "report.html", "enhanced.csv"]),
@@ -66,7 +66,9 @@ pub fn check_folder(folder: &Path, result_file: &str, inputs: &Inputs) -> Result
     if let Some(input) = &inputs.names_folder {
         check_same_input(folder, &comparable(input))?;
     }
-    let names = FILES.iter().find(|(result, _)| *result == result_file).map_or(&[][..], |(_, names)| names);
+    let alone = [result_file];
+    let names =
+        FILES.iter().find(|(result, _)| *result == result_file).map_or(&alone[..], |(_, names)| names);
     // An input may be an old file of the set with unchanged content; that is checked when the set is written.
     let inputs: Vec<_> = inputs.files.iter().filter(|input| !is_listed(folder, input)).collect();
     check_files(folder, &inputs, names.iter().map(|name| (*name, Content::Unknown)))

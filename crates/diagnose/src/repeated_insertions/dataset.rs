@@ -20,7 +20,7 @@ use stylet_record::{
     ColumnMap, QualityKind, QualityNote, ReadOptions, RecordError, Recording, check_usable,
     find_outlier_recordings, read_csv, read_csv_groups,
 };
-use stylet_scenario::{FieldError, InputError, parse, read_text};
+use stylet_scenario::{FieldError, InputError, Scenario, parse, read_text};
 use stylet_tissue::Tissue;
 
 /// Recording of a known force.
@@ -74,6 +74,10 @@ pub struct Dataset {
     /// Recordings of single layers.
     #[serde(default)]
     pub parts: Vec<SingleLayerPart>,
+    /// The scenario of which the set was made: its numbers are assumptions to be compared with the fitted ones. Those of a data set
+    /// file are starting values.
+    #[serde(skip)]
+    pub scenario: Option<Scenario>,
     /// Whether to drop and report rows with decreasing or repeated time stamps; set by the command line.
     #[serde(skip)]
     pub repair: bool,

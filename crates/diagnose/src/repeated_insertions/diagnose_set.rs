@@ -53,6 +53,17 @@ pub struct SetDiagnosis {
     pub recordings: Vec<SegmentedRecording>,
 }
 
+impl SetDiagnosis {
+    /// Compares the parameters of the base law with the numbers and tolerances of a scenario: findings, and the verdict
+    /// [`Verdict::Parameters`] if no effect is missing.
+    pub fn compare_with_scenario(&mut self, scenario: &Scenario) {
+        let d = &mut self.diagnosis;
+        claims::compare_with_scenario(&mut d.base_parameters, scenario);
+        claims::apply(d, &Context::default());
+        d.grade = Some(grade(d, 0.0));
+    }
+}
+
 /// Diagnoses repeated recordings after correction of instrument faults. `None` when the base law cannot be fitted.
 #[must_use]
 pub fn diagnose_set(

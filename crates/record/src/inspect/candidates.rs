@@ -441,7 +441,8 @@ fn signal_columns(head: TableHead<'_>, scan: &Scan, role: Role, free: &[usize]) 
     } else {
         named
     };
-    if let Some(parts) = components(head, free, &candidates) {
+    let translation = (role == Role::Position && !is_named).then(|| translation(head, scan, free)).flatten();
+    if let Some(parts) = translation.or_else(|| components(head, free, &candidates)) {
         let variances: Vec<f64> = parts.iter().map(|at| scan.columns[*at].variance()).collect();
         let total: f64 = variances.iter().sum();
         let (main, most) = variances.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -461,6 +462,28 @@ fn signal_columns(head: TableHead<'_>, scan: &Scan, role: Role, free: &[usize]) 
         _ => candidates.into_iter().max_by(by_roughness),
     };
     best.map(|at| vec![at])
+}
+
+/// The translation of a pose that is recorded as a homogeneous 4 × 4 matrix, column by column (as libfranka does) or row by row: sixteen columns
+/// of one name, four of them 0, 0, 0 and 1.
+fn translation(head: TableHead<'_>, scan: &Scan, free: &[usize]) -> Option<Vec<usize>> {
+    const ELEMENTS: usize = 16;
+    let stem = |at: usize| head.names[at].trim_end_matches(|c: char| !c.is_alphabetic());
+    let is_matrix = |at: &usize| {
+        head.named
+            && (*at..at + ELEMENTS).all(|k| free.contains(&k) && stem(k) == stem(*at))
+            && scan.columns[at + ELEMENTS - 1].is_constant_at(1.0)
+    };
+    free.iter().copied().filter(is_matrix).find_map(|start| {
+        let of = |elements: [usize; 3]| elements.map(|k| start + k);
+        let (last_by_columns, last_by_rows) = (of([3, 7, 11]), of([12, 13, 14]));
+        let are_zero = |part: [usize; 3]| part.iter().all(|at| scan.columns[*at].is_constant_at(0.0));
+        let moves = |part: [usize; 3]| part.iter().any(|at| !scan.columns[*at].is_constant());
+        [(last_by_columns, last_by_rows), (last_by_rows, last_by_columns)]
+            .into_iter()
+            .find(|(zero, translation)| are_zero(*zero) && moves(*translation))
+            .map(|(_, translation)| translation.to_vec())
+    })
 }
 
 /// Three columns of one name with x, y, z or three numbers; of six, as of a pose or a wrench, the first three.

@@ -64,6 +64,10 @@ impl ColumnScan {
         self.values == 0 || self.range() == 0.0
     }
 
+    pub(super) fn is_constant_at(&self, value: f64) -> bool {
+        self.values > 0 && self.min == value && self.max == value
+    }
+
     /// Whether the values are consecutive integers.
     pub(super) fn is_counter(&self) -> bool {
         let steps = self.values.saturating_sub(1);

@@ -15,7 +15,7 @@ use fitted_law::{causes, extended_law};
 use held_out_prediction::{held_out_predictions, residual_charts};
 use recording_variation::{between_recordings, measurement_chain};
 use stylet_diagnose::claims::contradicts;
-use stylet_diagnose::diagnosis_json::Verdict;
+use stylet_diagnose::diagnosis_json::{FindingKind, Verdict};
 use stylet_diagnose::repeated_insertions::SegmentedRecording;
 use stylet_diagnose::repeated_insertions::dataset::Dataset;
 use stylet_diagnose::repeated_insertions::diagnose_set::SetDiagnosis;
@@ -70,6 +70,14 @@ pub fn summary_sentence(study: &SetDiagnosis) -> String {
             "The insertions hold structure that no effect of the library explains; in addition the simulation lacks {}.",
             names.join(", ")
         ),
+        (Verdict::Parameters, _) => {
+            let off = d.findings.iter().filter(|f| f.kind == FindingKind::OutOfTolerance);
+            let off: Vec<&str> = off.map(|f| f.message.as_str()).collect();
+            format!(
+                "No effect of the library is missing, but numbers of the scenario are wrong: {}.",
+                off.join("; ")
+            )
+        }
         (_, true) => "The base law predicts new insertions as well as any extension of it.".to_owned(),
         (_, false) => format!("The simulation lacks {}.", names.join(", ")),
     };
