@@ -22,7 +22,6 @@ use stylet_record::{Recording, check_distinct, read_csv};
 use stylet_report::pages::repeated_insertions::{ablation_figure, page};
 use stylet_scenario::Scenario;
 use stylet_score::{MeasuredRecording, MeasuredScore, Trace};
-use stylet_tissue::Effect as _;
 
 /// Fewest recordings from which the variation between recordings can be estimated.
 const MIN_RECORDINGS: usize = 3;
@@ -47,22 +46,12 @@ struct Written<'a> {
 /// Reads the data set of the inputs; a scenario becomes a data set with its tissue.
 ///
 /// # Errors
-/// [`Error::Input`] when a file is wrong, [`Error::Request`] when the scenario assumes effects.
+/// [`Error::Input`] when a file is wrong.
 pub fn load_data_set(inputs: &DiagnosisInputs) -> Result<Dataset, Error> {
     let mut set = if is_dataset(&inputs.scenario)? {
         Dataset::load(&inputs.scenario)?
     } else {
-        let scenario = Scenario::load(&inputs.scenario)?;
-        if !scenario.effects.is_empty() {
-            let names: Vec<&str> = scenario.effects.iter().map(|e| e.info().id).collect();
-            return Err(Error::Request(format!(
-                "{}: assumes {}, and repeats are compared with the base law alone: take `effects` out of the scenario, or diagnose \
-                 the recordings without --repeats",
-                inputs.scenario.display(),
-                names.join(", ")
-            )));
-        }
-        data_set_of(scenario)
+        data_set_of(Scenario::load(&inputs.scenario)?)
     };
     apply_reading(&mut set, inputs)?;
     Ok(set)
@@ -150,8 +139,9 @@ pub fn diagnose_repeats(
     let known = load.as_ref().zip(set.load.as_ref()).map(|(r, l)| (r, l.force_n));
     let refs: Vec<&SegmentedRecording> = runs.iter().collect();
     let checks = ReferenceRecordings { air: air.as_ref(), load: known };
-    let mut study = diagnose_set(&set.name, &set.tissue, &refs, &checks, &mut *progress)
-        .ok_or_else(|| Error::internal("no model could be fitted to these recordings"))?;
+    let mut study =
+        diagnose_set(&set.name, &set.tissue, set.scenario.as_ref(), &refs, &checks, &mut *progress)
+            .ok_or_else(|| Error::internal("no model could be fitted to these recordings"))?;
     progress("model selection without parts of the set");
     if let Some(scenario) = &set.scenario {
         study.compare_with_scenario(scenario);

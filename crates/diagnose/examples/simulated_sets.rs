@@ -62,9 +62,14 @@ fn main() -> Result<(), Box<dyn Error>> {
                 .map(|s| (1e5 * s.0).round() / 100.0)
                 .collect::<Vec<_>>()
         );
-        let Some(s) =
-            diagnose_set("other", &assumed_tissue(layers), &refs, &ReferenceRecordings::default(), |_| {})
-        else {
+        let Some(s) = diagnose_set(
+            "other",
+            &assumed_tissue(layers),
+            None,
+            &refs,
+            &ReferenceRecordings::default(),
+            |_| {},
+        ) else {
             println!("{what}: no model");
             continue;
         };

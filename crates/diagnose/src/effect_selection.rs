@@ -46,20 +46,6 @@ pub(crate) struct OneEffectFit {
 }
 
 impl Search {
-    /// Runs the selection from a fit of the base law.
-    #[must_use]
-    pub fn run(
-        prepared: &PreparedRecordings,
-        base: Fit,
-        data: FitData,
-        progress: &mut impl FnMut(&str),
-    ) -> Self {
-        let mut search = Self::start(base, data);
-        search.add_effects(MAX_EFFECTS, prepared, progress);
-        search.finish(prepared);
-        search
-    }
-
     /// A selection before its first step, from a fit that may already have effects.
     pub(crate) fn start(fit: Fit, data: FitData) -> Self {
         Self { restarts: MAX_RESTARTS, prior_refits: MAX_PRIOR_STAGES, ..Self::from_fit(fit, data) }

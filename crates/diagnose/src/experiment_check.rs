@@ -9,7 +9,7 @@ use crate::error::DiagnoseError;
 use crate::identifiability::visible_effects;
 use crate::input_checks::{CleanRecordings, NamedRecording, check_recordings, clean_recordings};
 use crate::parameter_labels::label_parameters;
-use crate::verdict::base_parameters;
+use crate::verdict::{BOOTSTRAP_SEED, base_parameters};
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -27,8 +27,6 @@ const ONE_SPEED_FACTOR: f64 = 1.2;
 const HOLD_SHARE: f64 = 0.05;
 /// Duration (s) from which a hold shows relaxation.
 const MIN_HOLD_S: f64 = 0.5;
-/// Seed of the bootstrap, constant so that equal recordings give equal results.
-const BOOTSTRAP_SEED: u64 = 1;
 
 /// Result of the check, serialised as `check.json`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

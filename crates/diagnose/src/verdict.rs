@@ -54,8 +54,9 @@ const MAX_VARYING_SHARE: f64 = 0.001;
 const MAX_VARYING_SHARE_UNWEIGHTED: f64 = 0.03;
 /// Largest gain of the varying-coefficient test, as a share of the loss, for effects that can imitate any force of their kind.
 const MAX_VARYING_SHARE_IMITATING: f64 = 0.0005;
+
 /// Seed of the bootstrap, constant so that equal recordings give equal results.
-const BOOTSTRAP_SEED: u64 = 1;
+pub(crate) const BOOTSTRAP_SEED: u64 = 1;
 
 /// Assessment of a selection.
 pub(crate) struct Assessment {

@@ -18,7 +18,7 @@ fn diagnose(recordings: &[SegmentedRecording]) -> SetDiagnosis {
 
 fn diagnose_in(assumed: &Tissue, recordings: &[SegmentedRecording]) -> SetDiagnosis {
     let refs: Vec<&SegmentedRecording> = recordings.iter().collect();
-    diagnose_set("known", assumed, &refs, &ReferenceRecordings::default(), |_| {}).expect("a diagnosis")
+    diagnose_set("known", assumed, None, &refs, &ReferenceRecordings::default(), |_| {}).expect("a diagnosis")
 }
 
 #[test]

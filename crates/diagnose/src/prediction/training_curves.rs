@@ -2,12 +2,9 @@
 
 use super::group_deviation::Values;
 use super::insertion_course::{BINS, Curve, DepthRange, mean_curve, pooled};
+use crate::repeated_insertions::segmented_recording::{SPEED_TOLERANCE, STROKE_TOLERANCE_M};
 use serde::{Deserialize, Serialize};
 
-/// Largest relative difference of the speeds of comparable recordings.
-pub const SPEED_TOLERANCE: f64 = 0.1;
-/// Largest difference (m) of the deepest positions of comparable recordings.
-const STROKE_TOLERANCE_M: f64 = 1e-3;
 /// Largest difference of the curves of one and the same recording, as a share of the largest force.
 const SAME_RECORDING_SHARE: f64 = 1e-5;
 /// Resolution in N of the stored curves.

@@ -85,7 +85,7 @@ fn removal_candidates(model: &Model, events: &[Vec<RuptureEvent>]) -> Vec<(&'sta
 }
 
 /// Elastic forces (N) of a layer (0-based) at its ruptures, of the recordings in which it ruptured.
-pub(super) fn elastic_forces_at_ruptures_n(events: &[Vec<RuptureEvent>], layer: usize) -> Vec<f64> {
+fn elastic_forces_at_ruptures_n(events: &[Vec<RuptureEvent>], layer: usize) -> Vec<f64> {
     let ruptured = events.iter().filter_map(|e| e.get(layer).filter(|e| e.ruptured));
     ruptured.map(|e| e.elastic_n).filter(|f| *f > 0.0).collect()
 }

@@ -13,7 +13,7 @@ use super::parameter_estimates::{ParameterEstimate, base_parameters, jackknife_e
 use super::repeatability_report::{AblationRow, RepeatabilityReport, ReportInputs, repeatability_report};
 use super::scored_model::{ModelFamily, ScoredModel, active_effects, shaft_slip_info};
 use super::segmented_recording::{SegmentedRecording, have_several_speeds};
-use crate::claims::{self, Context};
+use crate::claims::{self, Context, SIGNIFICANT_P_VALUE};
 use crate::diagnosis_json::{
     Cause, Diagnosis, Estimate, Gain, NegligibleEffect, NoiseReport, RandomEffectSd, ResidualStructureReport,
     SearchCandidate, SearchStep, Verdict,
@@ -32,7 +32,8 @@ use stylet_tissue::{DelayedPuncture, Effect, PowerLawFriction, RateDependentPunc
 const START_VALUE_SEED: u64 = 1;
 /// Verdict `unknown`: smallest unexplained share of the base law's mean square error above the floor.
 const MAX_UNEXPLAINED_SHARE: f64 = 0.1;
-/// Verdict `unknown`: smallest excess of the held-out error over the floor, as a share of the floor; both are required.
+/// Verdict `unknown`: smallest excess of the held-out error over the floor, as a share of the floor; both are required, and residuals that
+/// depend on a feature.
 const MAX_EXCESS_OVER_FLOOR: f64 = 0.2;
 
 /// Result of the diagnosis of repeated recordings.
@@ -64,11 +65,13 @@ impl SetDiagnosis {
     }
 }
 
-/// Diagnoses repeated recordings after correction of instrument faults. `None` when the base law cannot be fitted.
+/// Diagnoses repeated recordings after correction of instrument faults. The numbers of a `scenario` are a guess that may be right; those of
+/// the `assumed` tissue of a data set are not used, only its layers. `None` when the base law cannot be fitted.
 #[must_use]
 pub fn diagnose_set(
     name: &str,
     assumed: &Tissue,
+    scenario: Option<&Scenario>,
     recordings: &[&SegmentedRecording],
     references: &ReferenceRecordings,
     mut progress: impl FnMut(&str),
@@ -78,7 +81,7 @@ pub fn diagnose_set(
     let recordings: Vec<&SegmentedRecording> = corrected.iter().collect();
     let recordings = recordings.as_slice();
     let mut rng = ChaCha8Rng::seed_from_u64(START_VALUE_SEED);
-    let candidates = select_model(assumed, recordings, &artefacts, &mut rng, &mut progress)?;
+    let candidates = select_model((assumed, scenario), recordings, &artefacts, &mut rng, &mut progress)?;
     progress("leave-one-out predictions");
     let held_out = leave_one_out(&candidates.best.set_fit, recordings);
     let base_held_out = base_predictions(&candidates, &held_out, recordings);
@@ -196,7 +199,9 @@ fn diagnosis(
         })
         .collect();
     causes.sort_by(|a, b| b.share.total_cmp(&a.share));
-    causes.extend(repeats.instrument.detected.iter().map(|s| s.cause()));
+    for fault in &repeats.instrument.detected {
+        add_fault(&mut causes, fault.cause());
+    }
     causes.extend(crate::sensor_artefact_causes::sensor_artefact_causes(artefacts, noise));
     let floor_n = mean.floor_n.unwrap_or(noise);
     let beyond = |e: f64| (e * e - floor_n * floor_n).max(0.0);
@@ -205,10 +210,11 @@ fn diagnosis(
     } else {
         (beyond(mean.model_n) / beyond(mean.base_n).max(1e-12)).min(1.0)
     };
+    let structure = residual_tests::test_residuals(&best.set_fit.fit, &best.set_fit.data).coloured_noise;
     let unknown = share > MAX_UNEXPLAINED_SHARE
         && mean.model_n > (1.0 + MAX_EXCESS_OVER_FLOOR) * floor_n
-        && mean.floor_n.is_some();
-    let structure = residual_tests::test_residuals(&best.set_fit.fit, &best.set_fit.data).coloured_noise;
+        && mean.floor_n.is_some()
+        && structure.p_value < SIGNIFICANT_P_VALUE;
     let verdict = match (unknown, causes.is_empty()) {
         (true, _) => Verdict::Unknown,
         (false, true) => Verdict::None,
@@ -266,6 +272,26 @@ fn diagnosis(
     claims::apply(&mut diagnosis, &Context::default());
     diagnosis.grade = Some(grade(&diagnosis, 0.0));
     diagnosis
+}
+
+/// Adds a fault that was corrected in the recordings. Where the model has the same effect for what the correction left, as of a drift, both are one
+/// cause, or none if their sum may be zero.
+fn add_fault(causes: &mut Vec<Cause>, fault: Cause) {
+    let Some(k) = causes.iter().position(|c| c.effect == fault.effect) else {
+        causes.push(fault);
+        return;
+    };
+    let cause = &mut causes[k];
+    cause.confidence = cause.confidence.max(fault.confidence);
+    for (path, corrected) in fault.parameters {
+        if let Some(e) = cause.parameters.get_mut(&path) {
+            (e.value, e.low, e.high) =
+                (e.value + corrected.value, e.low + corrected.value, e.high + corrected.value);
+        }
+    }
+    if cause.parameters.values().all(|e| e.low <= 0.0 && e.high >= 0.0) {
+        causes.remove(k);
+    }
 }
 
 /// Effects that recordings at a single speed do not identify.

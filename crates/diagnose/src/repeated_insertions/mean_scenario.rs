@@ -31,33 +31,29 @@ pub fn mean_scenario(
     if run.phases.retraction < r.len() {
         segments.push(Segment::Move { velocity_mps: -speed, duration_s: (deepest - start) / speed });
     }
+    let found = model.effects.iter().filter_map(EffectTerm::effect);
     Scenario {
-        name: format!("{name}: mean insertion"),
         source: "fitted to measured recordings by stylet diagnose".to_owned(),
-        tissue: model.tissue.clone(),
         effects: model
-            .effects
+            .assumed
+            .known_effects
             .iter()
-            .filter_map(EffectTerm::effect)
+            .cloned()
+            .chain(found)
             .chain(instrument.correctable_effects())
             .collect(),
-        candidates: Vec::new(),
-        motion: Motion::Program { start_m: start, segments },
         robot: Robot::Replay,
         sensor: Sensor::ForceTorque(ForceTorque {
             noise_n: instrument.noise_n.unwrap_or(DEFAULT_NOISE_N),
             ar1: instrument.ar1.unwrap_or(0.0).clamp(-0.99, 0.99),
             ..ForceTorque::default()
         }),
-        enhance: Default::default(),
-        enhance_virtual: None,
-        compare: Vec::new(),
         sample_hz: 100.0,
-        physics_hz: 1000.0,
-        tolerance: 0.3,
-        thickness_tolerance: 0.1,
-        surface_tolerance_m: 0.002,
-        seed: 1,
+        ..Scenario::new(
+            format!("{name}: mean insertion"),
+            model.tissue.clone(),
+            Motion::Program { start_m: start, segments },
+        )
     }
 }
 

@@ -1,19 +1,20 @@
 //! Selects the model of repeated recordings by cross-validation: base law, base law with library effects, or stick-slip of the shaft.
 
-use super::ablation::{ModelTerm, ablate, elastic_forces_at_ruptures_n};
+use super::ablation::{ModelTerm, ablate};
 use super::multistart_fit::{fit_from, set_blocks};
 use super::scored_model::{ModelFamily, ScoredModel, active_effects};
 use super::segmented_recording::{SegmentedRecording, group_by_speed_and_stroke};
 use super::start_values::base_law_prior;
 use super::stick_slip_fit::fit_stick_slip;
-use crate::base_law_fit::{PreparedRecordings, fit_base_law};
-use crate::effect_selection::Search;
-use crate::random_effect_selection::select_random_effects;
+use crate::base_law_fit::{PreparedRecordings, assumptions_of, roughness};
+use crate::measured_start::search_from_any_start;
 use rand::rngs::ChaCha8Rng;
 use std::sync::Arc;
-use stylet_identify::fit::{Effort, Fit, fit as fitted_on};
-use stylet_identify::model::{Assumptions, Model, RecordingParameters};
+use stylet_identify::model::{Model, RecordingParameters};
+use stylet_identify::rupture_assignment::assign_ruptures;
+use stylet_record::Recording;
 use stylet_record::sensor_artefacts::SensorArtefacts;
+use stylet_scenario::Scenario;
 use stylet_tissue::Tissue;
 
 /// Approximate number of recordings used in the search of the effect library, which limits its cost.
@@ -40,10 +41,11 @@ pub struct CandidateModels {
     pub terms: Vec<ModelTerm>,
 }
 
-/// Fits and compares the candidate models. `None` when the base law cannot be fitted.
+/// Fits and compares the candidate models: from the numbers of a scenario, if there is one, as a diagnosis of single recordings does, and from
+/// those in the data. `None` when the base law cannot be fitted.
 #[must_use]
 pub fn select_model(
-    assumed: &Tissue,
+    (assumed, scenario): (&Tissue, Option<&Scenario>),
     recordings: &[&SegmentedRecording],
     artefacts: &SensorArtefacts,
     rng: &mut ChaCha8Rng,
@@ -51,58 +53,42 @@ pub fn select_model(
 ) -> Option<CandidateModels> {
     progress("fitting the base law");
     let prepared = PreparedRecordings::new(
-        Arc::new(base_law_prior(assumed, recordings)),
+        Arc::new(scenario.map_or_else(|| base_law_prior(assumed, recordings), assumptions_of)),
         set_blocks(recordings, artefacts),
         quantisation_noise_n(artefacts),
     );
-    let (fit, _) = fit_base_law(&prepared)?;
-    // The first fit finds the ruptures; the second one starts with the elastic forces at them.
-    let assumed_law = Arc::new(with_forces_at_ruptures(&prepared.assumed, &fit));
-    let prepared = PreparedRecordings { assumed: assumed_law, ..prepared };
-    let (fit, data) = fit_base_law(&prepared)?;
-    let (fit, data) = select_random_effects(fit, data);
-    // Ruptures are at the drops that the base law explains, or at the largest drops, where another law holds.
-    let largest: Vec<Vec<f64>> = recordings.iter().map(|r| r.ruptures_s.clone()).collect();
-    let rupture_times_s = [fit.model.rupture_times_s.clone(), largest];
     let (searched, which) = search_subset(&prepared, recordings);
-    let fewer = data.subset(&which);
-    let fit = fitted_on(&fit.model.subset(&which), &fewer, Effort::FULL)?;
-    let search = Search::run(&searched, fit, fewer, progress);
+    let clean: Vec<Recording> = which.iter().map(|r| recordings[*r].recording.clone()).collect();
+    let (search, _) = search_from_any_start(searched, &clean, progress)?;
     let drops = prepared.drop_times();
     let on = |model: &Model| {
         let mut model = model.clone();
         model.per_recording = vec![RecordingParameters::default(); recordings.len()];
+        model.zero_steps = vec![Vec::new(); recordings.len()];
         (model.free.recording_surface, model.free.recording_friction) = (true, true);
-        let at = |times_s: &Vec<Vec<f64>>| {
-            let model = Model { rupture_times_s: times_s.clone(), ..model.clone() };
-            fit_from(&model, prepared.blocks.to_vec(), drops.clone())
-        };
-        rupture_times_s.iter().filter_map(at).min_by(|a, b| a.rms_n().total_cmp(&b.rms_n()))
+        let assigned =
+            assign_ruptures(&model, &prepared.blocks, &prepared.drops, 1.0, roughness(&prepared.blocks));
+        let fitted = |r: usize| which.iter().position(|w| *w == r).map(|i| model.rupture_times_s[i].clone());
+        model.rupture_times_s =
+            assigned.into_iter().enumerate().map(|(r, times_s)| fitted(r).unwrap_or(times_s)).collect();
+        fit_from(&model, prepared.blocks.to_vec(), drops.clone())
     };
     let base = ScoredModel::new(ModelFamily::Base, on(&search.base.model)?, recordings);
     let library = (!search.best.model.effects.is_empty())
         .then(|| on(&search.best.model))
         .flatten()
         .map(|f| ScoredModel::new(ModelFamily::Library, f, recordings));
-    progress("fitting the stick-slip model from several starts");
-    let slip = fit_stick_slip(assumed, recordings, artefacts, rng);
+    // Where only noise is left, there is nothing that another mechanism could explain.
+    let slip = (!search.leaves_noise(&search.best))
+        .then(|| {
+            progress("fitting the stick-slip model from several starts");
+            fit_stick_slip(assumed, recordings, artefacts, rng)
+        })
+        .flatten();
     let mut best = best_candidate(&base, slip.as_ref(), library.as_ref()).clone();
     progress("testing the terms of the model");
     let parts = ablate(&mut best, recordings);
     Some(CandidateModels { base, library, slip, best, terms: parts })
-}
-
-/// The prior with the median elastic force at the ruptures of a fit as puncture force of each layer that ruptures in at least half of the recordings.
-fn with_forces_at_ruptures(prior: &Assumptions, fit: &Fit) -> Assumptions {
-    let mut out = prior.clone();
-    let events = &fit.residuals.ruptures;
-    for (l, layer) in out.tissue.layers.iter_mut().enumerate() {
-        let forces_n = elastic_forces_at_ruptures_n(events, l);
-        if 2 * forces_n.len() >= events.len() && layer.puncture_n.is_some() {
-            layer.puncture_n = Some(stylet_stats::median_of(forces_n));
-        }
-    }
-    out
 }
 
 /// Quantisation noise (N).

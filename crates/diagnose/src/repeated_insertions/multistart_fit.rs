@@ -5,6 +5,7 @@ use super::segmented_recording::{SPEED_TOLERANCE, SegmentedRecording};
 use super::start_values::{
     EXPECTED_DAY_FRICTION_SD, EXPECTED_DAY_SURFACE_SD_M, SLIP_RATE_INDEX, StartValues, shaft_slip_start,
 };
+use crate::base_law_fit::COARSENING_FACTOR;
 use rand::{RngExt, rngs::ChaCha8Rng};
 use std::sync::Arc;
 use stylet_identify::block_averages::BlockAverages;
@@ -20,8 +21,6 @@ use stylet_tissue::{AnyEffect, Effect, Tissue};
 
 /// Block length (s) of repeated recordings: insertions repeat no more precisely than this.
 pub const SET_BLOCK_S: f64 = 0.08;
-/// Factor by which blocks of the first fits are longer.
-const COARSENING_FACTOR: usize = 3;
 /// Standard deviation of the initial noise, as a share of the largest force.
 const INITIAL_NOISE_SHARE: f64 = 0.1;
 /// Weight of the prior scatter between days, in days.

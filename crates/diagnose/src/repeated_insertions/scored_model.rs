@@ -5,6 +5,7 @@ use super::multistart_fit::{SET_BLOCK_S, SetFit};
 use super::population_prediction::predict_force;
 use super::random_effects_population::Population;
 use super::segmented_recording::{SegmentedRecording, group_by_speed_and_stroke, have_several_speeds};
+use crate::base_law_fit::COARSENING_FACTOR;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::model::Model;
 use stylet_stats::parallel::*;
@@ -14,8 +15,6 @@ use stylet_tissue::{Effect, EffectInfo, ShaftSlip};
 const FOLDS: usize = 3;
 /// Largest number of recordings that are held out one by one.
 const LEAVE_ONE_OUT_LIMIT: usize = 8;
-/// Coarsening factor of the blocks in cross-validation, which limits its cost.
-const COARSENING_FACTOR: usize = 3;
 /// Iterations of a refit in cross-validation.
 pub(super) const REFIT_TURNS: usize = 5;
 /// Draws of a prediction in cross-validation.

@@ -8,9 +8,9 @@ use stylet_record::{QualityNote, Recording};
 use stylet_stats::order_statistics::median_of;
 
 /// Relative tolerance of the speeds in a group, which is assumed to be recorded on one day.
-pub(super) const SPEED_TOLERANCE: f64 = 0.1;
+pub const SPEED_TOLERANCE: f64 = 0.1;
 /// Tolerance (m) of the strokes in a group.
-const STROKE_TOLERANCE_M: f64 = 1e-3;
+pub(crate) const STROKE_TOLERANCE_M: f64 = 1e-3;
 
 /// A recording of an insertion with its phases and detected events.
 #[derive(Clone, Debug)]

@@ -1,8 +1,8 @@
 use super::{
-    MAX_EXCESS_OVER_FLOOR, ablation_rows, advice, base_predictions, cause, diagnosis, negligible_effects,
-    search_step,
+    MAX_EXCESS_OVER_FLOOR, ablation_rows, add_fault, advice, base_predictions, cause, diagnosis,
+    negligible_effects, search_step,
 };
-use crate::diagnosis_json::{Diagnosis, Verdict};
+use crate::diagnosis_json::{Cause, Diagnosis, Estimate, Verdict};
 use crate::repeated_insertions::ablation::ModelTerm;
 use crate::repeated_insertions::cross_validation::HeldOutPrediction;
 use crate::repeated_insertions::held_out_loss::paired_confidence;
@@ -52,6 +52,28 @@ fn the_share_of_a_cause_is_its_loss_relative_to_the_explained_error() {
     assert_eq!(cause("x", &[], 1.0, &[0.01, 0.01], &best, &base).share, 0.0);
     assert_eq!(cause("x", &[], 1.0, &[f64::NAN, 0.01], &best, &base).share, 1.0);
     assert_eq!(cause("x", &[], 1.0, &[0.3], &base, &best).gain_nats, 0.0);
+}
+
+#[test]
+fn a_drift_that_a_correction_left_is_one_cause_with_the_corrected_one() {
+    let drift = |value: f64, confidence: f64| {
+        let estimate = Estimate { value, low: value - 0.001, high: value + 0.002 };
+        let parameters = [("rate_n_per_s".to_owned(), estimate)].into_iter().collect();
+        Cause { effect: "force_drift".to_owned(), confidence, parameters, ..Cause::default() }
+    };
+    let mut causes = vec![drift(0.003, 0.4)];
+    add_fault(&mut causes, drift(0.012, 0.9));
+    let e = causes[0].parameters["rate_n_per_s"];
+    assert_eq!((causes.len(), causes[0].confidence), (1, 0.9));
+    assert!(
+        (e.value - 0.015).abs() < 1e-12 && (e.low - 0.014).abs() < 1e-12 && (e.high - 0.017).abs() < 1e-12
+    );
+    // A correction that the model takes back was none.
+    add_fault(&mut causes, drift(-0.0145, 0.9));
+    assert_eq!(causes, []);
+    causes = vec![drift(0.003, 0.4)];
+    add_fault(&mut causes, Cause { effect: "force_bias".to_owned(), ..Cause::default() });
+    assert_eq!(causes.len(), 2);
 }
 
 fn term(effect: &'static str, name: &str, without_n: &[f64], kept: bool) -> ModelTerm {

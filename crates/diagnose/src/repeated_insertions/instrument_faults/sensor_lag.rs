@@ -10,7 +10,7 @@ use super::air_baseline::least_squares;
 use crate::repeated_insertions::segmented_recording::SegmentedRecording;
 use stylet_record::Recording;
 use stylet_stats::parallel::*;
-use stylet_stats::{interpolate, sd, student_t};
+use stylet_stats::{interpolate, mean, sd, student_t};
 
 /// Window (s) before and after a corner.
 const WINDOW_S: (f64, f64) = (1.0, 0.8);
@@ -18,6 +18,9 @@ const WINDOW_S: (f64, f64) = (1.0, 0.8);
 const STANDSTILL_S: f64 = 0.2;
 /// Largest delay or lag (s) that is searched.
 const MAX_LAG_S: f64 = 0.8;
+/// Largest difference of the distances travelled in the thirds of the window before a corner from their mean, as a share of it, and what is
+/// accepted in any case (m). At a varying speed the force before the corner is no line.
+const MAX_UNEVENNESS: (f64, f64) = (0.04, 2e-5);
 /// Step (s) of the search.
 const STEP_S: f64 = 0.02;
 /// Smallest delay or lag (s) attributed to the sensor; play and rounded corners of the drive cause shorter ones.
@@ -162,8 +165,9 @@ impl<'a> Corner<'a> {
         let end = r.time_s.partition_point(|t| *t < to_s);
         // A rupture inside the window would disturb the fit, also one that appears delayed.
         let torn = run.ruptures_s.iter().any(|t| (from_s - MAX_LAG_S..to_s).contains(t));
+        let even = is_even(r, from_s, if at == CornerKind::Stop { stop_s } else { at_s - STANDSTILL_S });
         let turned_m = r.position_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        (alone && !torn && end - first > 4 * REGRESSORS).then(|| Self {
+        (alone && even && !torn && end - first > 4 * REGRESSORS).then(|| Self {
             name: &run.name,
             recording: r,
             at,
@@ -221,6 +225,15 @@ impl<'a> Corner<'a> {
         }
         least_squares(&rows, self.force_n).1.iter().map(|e| e * e).sum()
     }
+}
+
+/// Whether the needle travels equally far in each third of a time span.
+fn is_even(r: &Recording, from_s: f64, to_s: f64) -> bool {
+    let at_m = |k: u32| interpolate(&r.time_s, &r.position_m, from_s + f64::from(k) / 3.0 * (to_s - from_s));
+    let thirds_m = [at_m(1) - at_m(0), at_m(2) - at_m(1), at_m(3) - at_m(2)];
+    let middle_m = mean(&thirds_m);
+    let tolerance_m = (MAX_UNEVENNESS.0 * middle_m.abs()).max(MAX_UNEVENNESS.1);
+    thirds_m.iter().all(|travel_m| (travel_m - middle_m).abs() <= tolerance_m)
 }
 
 /// Number of regressors.

@@ -83,6 +83,31 @@ fn delay_and_low_pass_lag_are_distinguished_and_measured() {
 }
 
 #[test]
+fn a_trembling_advance_before_the_reversal_shows_no_delay() {
+    // Advance at 2.5 mm/s, modulated by 30 % at 0.5 Hz, then retraction; the friction on the shaft follows the velocity.
+    let trembling = |seed: u64| {
+        let (mut t, mut z, mut f, mut tip, mut noise) = (vec![], vec![], vec![], -0.002, seed);
+        for k in 0..900 {
+            let at = 0.02 * f64::from(k);
+            let v = if at < 10.0 {
+                0.0025 * (1.0 + 0.3 * libm::sin(core::f64::consts::PI * at))
+            } else {
+                -0.0025
+            };
+            tip = f64::max(tip + 0.02 * v, -0.002);
+            noise = (noise * 1_103_515_245 + 12_345) % 2_147_483_648;
+            let inside = f64::max(tip, 0.0);
+            t.push(at);
+            z.push(tip);
+            f.push((100.0 + 6000.0 * v) * inside + 0.01 * (noise as f64 / 2_147_483_648.0 - 0.5));
+        }
+        SegmentedRecording::new(seed.to_string(), Recording::new(t, z, f).expect("clean columns"), 1)
+    };
+    let recordings: Vec<SegmentedRecording> = (3..7).map(trembling).collect();
+    assert_eq!(detect_lag(&recordings.iter().collect::<Vec<_>>()), None);
+}
+
+#[test]
 fn the_interval_of_a_delay_is_a_jackknife_interval() {
     let recordings: Vec<SegmentedRecording> = [0.26, 0.3, 0.36]
         .iter()
