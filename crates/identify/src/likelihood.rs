@@ -6,7 +6,7 @@ use crate::forward_model::{
 };
 use crate::model::{CompiledModel, Model, NO_RUPTURE, Parameter};
 use crate::motion::MotionPiece;
-use crate::noise::{HUBER_LOSS, Noise, NoiseSource, WhiteningPlan};
+use crate::noise::{Noise, NoiseSource, WhiteningPlan, huber_loss};
 use crate::rupture_likelihood::{RuptureEvent, evaluate_rupture};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -212,7 +212,7 @@ impl ReplayCache {
         let e: Vec<f64> = b.force_n.iter().zip(&now.force_n).map(|(y, f)| y - f).collect();
         let w = data.whiten(r, &e);
         let events: f64 = now.ruptures.iter().map(|e| evaluate_rupture(e, &model.scatter).nats).sum();
-        let sum = w.iter().map(|w| HUBER_LOSS.value(*w)).sum::<f64>() + events;
+        let sum = w.iter().map(|w| huber_loss(*w)).sum::<f64>() + events;
         if sum.is_finite() { sum } else { NO_RUPTURE }
     }
 
@@ -247,8 +247,7 @@ pub fn residuals(model: &Model, data: &FitData) -> Option<Residuals> {
 /// Negative log posterior in nats of given residuals.
 #[must_use]
 pub fn neg_log_posterior(model: &Model, r: &Residuals) -> f64 {
-    let mut sum: f64 =
-        r.innovations.iter().map(|w| w.iter().map(|w| HUBER_LOSS.value(*w)).sum::<f64>()).sum();
+    let mut sum: f64 = r.innovations.iter().map(|w| w.iter().map(|w| huber_loss(*w)).sum::<f64>()).sum();
     sum += rupture_nats(model, r);
     sum + prior_nats(model)
 }

@@ -3,7 +3,7 @@
 use crate::fit::{Fit, JacobianColumn, Linearization};
 use crate::likelihood::FitData;
 use crate::model::EffectTerm;
-use crate::noise::HUBER_LOSS;
+use crate::noise::huber_weight;
 use stylet_stats::linear_algebra::{CholeskyFactor, SymmetricMatrix};
 use stylet_tissue::{EffectInfo, FitScale};
 
@@ -97,7 +97,7 @@ impl<'a> ScoreTest<'a> {
             let mut w = self.data.whiten(r, force);
             w.iter_mut()
                 .zip(&self.fit.residuals.innovations[r])
-                .for_each(|(w, at)| *w *= HUBER_LOSS.weight(*at).sqrt());
+                .for_each(|(w, at)| *w *= huber_weight(*at).sqrt());
             column.innovations.push(w);
             column.rupture_rows.push(vec![0.0; 4 * self.fit.residuals.ruptures[r].len()]);
         }

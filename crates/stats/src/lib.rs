@@ -2,14 +2,13 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`order_statistics`] | median, quantiles (one definition), MAD scale, interval of a quantile |
+//! | [`order_statistics`] | median, quantiles (one definition), interval of a quantile |
 //! | [`streaming_quantiles`] | exact quantiles of more values than fit into memory |
 //! | [`confidence_interval`] | Wilson interval of a rate, Student interval of a mean |
-//! | [`normal`], [`student_t`] | densities, tails, quantiles |
-//! | [`special_functions`] | incomplete gamma and beta functions, chi-square and F tails |
-//! | [`moments`] | compensated sum; mean, variance, RMS, running moments |
-//! | [`robust_loss`] | Huber and Student losses, weights, M-estimate of location |
-//! | [`autoregressive`] | autoregressive noise: fit, order selection, exact whitening, likelihood |
+//! | [`normal`], [`student_t`] | density, tails, quantiles |
+//! | [`special_functions`] | incomplete gamma and beta functions, chi-square tail |
+//! | [`moments`] | mean, variance, RMS |
+//! | [`robust_loss`] | Huber loss and weight |
 //! | [`robust_linear_prediction`] | linear prediction by robust least squares |
 //! | [`least_squares`] | linear least squares by normal equations |
 //! | [`linear_algebra`] | small dense matrices: Cholesky factor, scalar product |
@@ -22,7 +21,6 @@
 //! any number of threads); `tests/against_scipy.rs` compares them with SciPy. Undefined results are `NaN`, as in NumPy:
 //! the median of an empty slice, a quantile at a probability outside 0 to 1.
 
-pub mod autoregressive;
 pub mod confidence_interval;
 pub mod interpolation;
 pub mod least_squares;
@@ -40,17 +38,15 @@ pub mod spectrum;
 pub mod streaming_quantiles;
 pub mod student_t;
 
-pub use autoregressive::{Ar, Criterion};
 pub use confidence_interval::{Interval, mean_interval, wilson, wilson_at};
 pub use interpolation::interpolate;
-pub use moments::{Moments, Sum, UNIFORM_SD, mean, rms, sd, variance};
+pub use moments::{UNIFORM_SD, mean, rms, sd, variance};
 pub use normal::Z95;
 pub use order_statistics::{
-    MAD_TO_SD, extremes, mad_scale, median, median_of, quantile, quantile_interval, quantile_of,
-    quantile_of_sorted, sorted, third_difference_sd,
+    MAD_TO_SD, extremes, median, median_of, quantile, quantile_interval, quantile_of, quantile_of_sorted,
+    sorted, third_difference_sd,
 };
 pub use rank_correlation::spearman;
-pub use robust_loss::Loss;
 pub use streaming_quantiles::quantiles_of_stream;
 
 /// Compiles the examples of the README.

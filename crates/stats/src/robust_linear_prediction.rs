@@ -4,7 +4,7 @@
 
 use crate::linear_algebra::SymmetricMatrix;
 use crate::order_statistics::{MAD_TO_SD, median};
-use crate::robust_loss::Loss;
+use crate::robust_loss::huber_weight;
 
 /// Prediction error of the first element of a row: `row[0] - sum_i a[i] row[i]`, `i >= 1`; `a[0]` is not used.
 #[inline]
@@ -30,13 +30,12 @@ pub fn robust_linear_prediction<const N: usize>(
     huber: f64,
     iterations: usize,
 ) -> ([f64; N], f64) {
-    let loss = Loss::Huber { k: huber };
     let mut a = [0.0; N];
     let mut s = if iterations == 1 { f64::INFINITY } else { sd };
     for _ in 0..iterations {
         let mut sums = [[0.0; N]; N];
         for row in rows {
-            let w = loss.weight(prediction_residual(row, &a) / s);
+            let w = huber_weight(prediction_residual(row, &a) / s, huber);
             for (sums, i) in sums.iter_mut().zip(columns) {
                 let x = w * row[*i];
                 sums[0] += x * row[0];
@@ -66,7 +65,6 @@ fn rms_error<const N: usize>(rows: &[[f64; N]], a: &[f64; N]) -> f64 {
 /// Scale of the prediction errors under Huber's loss: the square root of `sum weight w^2 / n` over its expectation for normal
 /// noise.
 fn huber_scale<const N: usize>(rows: &[[f64; N]], a: &[f64; N], huber: f64) -> f64 {
-    let loss = Loss::Huber { k: huber };
     let mut size: Vec<f64> = rows.iter().map(|row| prediction_residual(row, a).abs()).collect();
     let mut s = (median(&mut size) * MAD_TO_SD).max(1e-300);
     for _ in 0..6 {
@@ -74,7 +72,7 @@ fn huber_scale<const N: usize>(rows: &[[f64; N]], a: &[f64; N], huber: f64) -> f
             .iter()
             .map(|row| {
                 let w = prediction_residual(row, a) / s;
-                loss.weight(w) * w * w
+                huber_weight(w, huber) * w * w
             })
             .sum();
         // For normal noise E[min(|w|, k)|w|] = erf(k/sqrt 2).

@@ -4,7 +4,7 @@ use super::jacobian_column::{JacobianColumn, support};
 use crate::forward_model::ReplayResult;
 use crate::likelihood::{FitData, ReplayCache, Residuals, replay};
 use crate::model::{Model, NO_RUPTURE, Parameter, ParameterRole};
-use crate::noise::HUBER_LOSS;
+use crate::noise::huber_weight;
 use crate::rupture_likelihood::rupture_rows_at;
 use core::ops::Range;
 use stylet_stats::linear_algebra::{CholeskyFactor, SymmetricMatrix, dot};
@@ -41,7 +41,7 @@ impl Linearization {
     pub fn new(model: &Model, data: &FitData, at: &Residuals) -> Self {
         let (shared, per_recording) = (model.shared_parameters(), model.recording_parameters());
         let roots: Vec<Vec<f64>> =
-            at.innovations.iter().map(|w| w.iter().map(|w| HUBER_LOSS.weight(*w).sqrt()).collect()).collect();
+            at.innovations.iter().map(|w| w.iter().map(|w| huber_weight(*w).sqrt()).collect()).collect();
         let mut t = Self {
             residual: JacobianColumn {
                 innovations: weighted(&at.innovations, &roots),

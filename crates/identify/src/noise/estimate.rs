@@ -3,9 +3,8 @@
 use super::detrend::detrended_residuals;
 use super::force_bin::{AfterBreak, ForceBinNoise};
 use super::long_memory::{AR_ORDER, ROW_LEN, SEARCH_STRETCHES, STRETCHES, regression_row, running_sums};
-use super::{HUBER_K, HUBER_LOSS, Noise};
+use super::{HUBER_K, Noise, huber_loss};
 use crate::block_averages::BlockAverages;
-use stylet_stats::autoregressive::stationary;
 use stylet_stats::order_statistics::{median, quantile_of_sorted};
 use stylet_stats::parallel::*;
 use stylet_stats::robust_linear_prediction::{prediction_residual, robust_linear_prediction};
@@ -116,9 +115,8 @@ impl Noise {
             }
             let near: [f64; AR_ORDER] = core::array::from_fn(|i| near[i]);
             let slow: [f64; STRETCHES.len()] = core::array::from_fn(|i| slow[i]);
-            let loss: f64 =
-                rows.iter().map(|row| HUBER_LOSS.value(prediction_residual(row, &a) / s)).sum::<f64>()
-                    + n * libm::log(s);
+            let loss: f64 = rows.iter().map(|row| huber_loss(prediction_residual(row, &a) / s)).sum::<f64>()
+                + n * libm::log(s);
             let cost = loss + 0.5 * order as f64 * libm::log(n);
             if best.is_none_or(|b| cost < b.0) {
                 let first = [AfterBreak::without_history(sd_n.max(s)); AR_ORDER];
@@ -153,6 +151,23 @@ impl Noise {
         }
         best
     }
+}
+
+/// Whether a process with these coefficients, newest first, is stationary (Schur-Cohn criterion by Levinson's recursion
+/// downwards). Partial autocorrelations of 0.999 and more count as not stationary.
+fn stationary(a: &[f64]) -> bool {
+    let mut a = a.to_vec();
+    while let Some(k) = a.pop() {
+        if k.abs() >= 0.999 {
+            return false;
+        }
+        let rest = a.clone();
+        let m = rest.len();
+        for i in 0..m {
+            a[i] = (rest[i] + k * rest[m - 1 - i]) / (1.0 - k * k);
+        }
+    }
+    true
 }
 
 #[cfg(test)]
@@ -223,5 +238,36 @@ mod tests {
         assert_eq!((floor.bins[0].sd_n, floor.bins[0].innovation_sd_n), (0.02, 0.02));
         let least = Noise::estimate(&[still(60)], &[vec![0.0; 60]], NoiseSource::Residual, 0.0);
         assert_eq!(least.bins[0].sd_n, 1e-6);
+    }
+
+    /// The roots of the characteristic polynomial all lie inside the unit circle.
+    #[test]
+    fn a_process_is_stationary_when_its_roots_are_inside_the_unit_circle() {
+        // Coefficients of `(1 - p z)(1 - q z)(1 - r z)`.
+        let product = |p: f64, q: f64, r: f64| [p + q + r, -(p * q + p * r + q * r), p * q * r];
+        for (p, q, r, wanted) in [
+            (0.5, 0.3, -0.4, true),
+            (0.95, 0.9, 0.85, true),
+            (0.95, -0.97, 0.3, true),
+            (1.05, 0.4, 0.2, false),
+            (0.5, -1.02, 0.1, false),
+            (0.2, 1.2, 0.9, false),
+            (0.2, 1.2, 0.7, false),
+        ] {
+            assert_eq!(stationary(&product(p, q, r)), wanted, "{p} {q} {r}");
+        }
+        // The triangle of two coefficients.
+        for (a, b, wanted) in [
+            (0.5, 0.45, true),
+            (0.5, 0.55, false),
+            (-1.4, -0.6, true),
+            (-1.7, -0.6, false),
+            (0.2, -0.998, true),
+            (0.2, -0.9995, false),
+            (1.5, -0.6, true),
+        ] {
+            assert_eq!(stationary(&[a, b]), wanted, "{a} {b}");
+        }
+        assert!(stationary(&[]) && stationary(&[0.998]) && !stationary(&[0.999]) && !stationary(&[-1.0]));
     }
 }

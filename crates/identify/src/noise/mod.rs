@@ -21,12 +21,22 @@ pub use force_bin::{AfterBreak, ForceBinNoise};
 pub use long_memory::AR_ORDER;
 pub use whiten::WhiteningPlan;
 
-use stylet_stats::Loss;
-
 /// Huber threshold in standard deviations: beyond it the loss of a residual is linear.
 pub const HUBER_K: f64 = 2.5;
+
 /// Huber loss of a normalised residual, in nats.
-pub const HUBER_LOSS: Loss = Loss::Huber { k: HUBER_K };
+#[inline]
+#[must_use]
+pub fn huber_loss(r: f64) -> f64 {
+    stylet_stats::robust_loss::huber_loss(r, HUBER_K)
+}
+
+/// Weight of a normalised residual in re-weighted least squares.
+#[inline]
+#[must_use]
+pub fn huber_weight(r: f64) -> f64 {
+    stylet_stats::robust_loss::huber_weight(r, HUBER_K)
+}
 
 /// Noise model of a set of recordings.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,13 +2,23 @@ use super::super::AfterBreak;
 use super::super::tests::still;
 use super::*;
 use crate::test_support::{assert_close, normal};
-use stylet_stats::Ar;
 use stylet_stats::linear_algebra::SymmetricMatrix;
 
+/// Autocovariance of the process with these partial autocorrelations (Levinson and Durbin).
+fn autocovariance(reflection: &[f64], sd: f64) -> Vec<f64> {
+    let (mut c, mut a, mut left) = (vec![sd * sd], Vec::<f64>::new(), sd * sd);
+    for lag in 1..12 {
+        let k = reflection.get(lag - 1).copied().unwrap_or(0.0);
+        c.push(a.iter().zip(c.iter().rev()).map(|(a, c)| a * c).sum::<f64>() + k * left);
+        a = a.iter().zip(a.iter().rev()).map(|(x, y)| x - k * y).chain([k]).collect();
+        left *= 1.0 - k * k;
+    }
+    c
+}
+
 /// Noise with the exact predictors of an autoregressive process, and its autocovariance.
-fn of_process(ar: &Ar) -> (ForceBinNoise, Vec<f64>) {
-    let mut c = vec![0.0; 12];
-    ar.autocovariance(&mut c);
+fn of_process(reflection: &[f64], sd: f64) -> (ForceBinNoise, Vec<f64>) {
+    let c = autocovariance(reflection, sd);
     let mut bin = ForceBinNoise::white(c[0].sqrt());
     for run in 0..=AR_ORDER {
         let mut h = SymmetricMatrix::zeros(run);
@@ -51,8 +61,7 @@ fn ln_density(e: &[f64], covariance: impl Fn(usize, usize) -> f64) -> f64 {
 
 #[test]
 fn whitening_gives_the_likelihood_of_the_dense_covariance() {
-    let ar = Ar::from_reflection(&[0.6, -0.35, 0.2, 0.1], 0.03);
-    let (bin, c) = of_process(&ar);
+    let (bin, c) = of_process(&[0.6, -0.35, 0.2, 0.1], 0.03);
     let mut b = still(12);
     // A block that is not compared ends the memory.
     b.used[7] = false;
