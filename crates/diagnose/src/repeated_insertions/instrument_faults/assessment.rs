@@ -8,7 +8,7 @@ use super::sensor_lag::{DetectedLag, LagModel, detect_lag};
 use crate::diagnosis_json::Estimate;
 use crate::repeated_insertions::segmented_recording::SegmentedRecording;
 use stylet_record::Recording;
-use stylet_stats::{mean_interval, median};
+use stylet_stats::median;
 use stylet_tissue::{
     AnyEffect, DriveFriction, Effect, ForceBias, ForceDrift, ForceGain, LowPassLag, PeriodicInterference,
     TimeDelay,
@@ -90,12 +90,8 @@ impl InstrumentReport {
             self.bias_n = Some(bias);
         }
         if air.is_none() {
+            // The slope of the short time in air is no drift of a whole recording: the search finds that.
             self.noise_n = Some(stylet_stats::median_of(lines.iter().map(|l| l.sd_n)));
-            // The slope of a short stretch in air is used only if its uncertainty over the recording is negligible.
-            let rates = of(|l| l.rate_n_per_s);
-            self.drift_n = mean_interval(&rates)
-                .filter(|i| 0.5 * (i.high - i.low) * duration_s < NEGLIGIBLE_SHARE * force_n)
-                .map(|_| consensus(&rates) * duration_s);
         }
     }
 
