@@ -236,19 +236,6 @@ fn repeats_without_retraction_are_reported_without_nan() {
 }
 
 #[test]
-fn repeats_refuse_a_scenario_with_assumed_effects() {
-    let scratch = Scratch::new("unusable-effects");
-    let run = text(&scratch.file("run.csv", csv(simulated(&scratch, 1))));
-    let with = ASSUMED.replace("    motion:", "    effects: [CoulombFriction(c_n_per_m: 6.0)],\n    motion:");
-    let assumed = text(&scratch.file("with.ron", with));
-    let output = stylet(&["diagnose", &assumed, "--repeats", "--data", &run, &run, &run]);
-    assert_eq!(output.status.code(), Some(2), "{}", flat(&output));
-    for word in ["with.ron", "coulomb_friction", "without --repeats"] {
-        assert!(flat(&output).contains(word), "{}", flat(&output));
-    }
-}
-
-#[test]
 fn a_recording_that_is_too_long_is_downsampled_with_a_note() {
     let scratch = Scratch::new("unusable-long");
     let rows = simulated(&scratch, 1);
