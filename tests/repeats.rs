@@ -55,5 +55,5 @@ fn repeats_are_diagnosed_as_single_recordings_are() {
     let found = said(&assumed, &recordings, &out("2"));
     assert!(found.starts_with("The simulation lacks coulomb_friction."), "{found}");
     let again = said(&format!("{}/extended.ron", out("2")), &recordings, &out("3"));
-    assert!(again.starts_with("The base law predicts new insertions as well"), "{again}");
+    assert!(again.starts_with("The assumed model predicts new insertions as well"), "{again}");
 }

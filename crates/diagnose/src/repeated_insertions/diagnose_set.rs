@@ -10,7 +10,9 @@ use super::mean_scenario::mean_scenario;
 use super::model_selection::{CandidateModels, select_model};
 use super::nested_cross_validation::nested_cross_validation;
 use super::parameter_estimates::{ParameterEstimate, base_parameters, jackknife_estimates};
-use super::repeatability_report::{AblationRow, RepeatabilityReport, ReportInputs, repeatability_report};
+use super::repeatability_report::{
+    AblationRow, MeanReport, RepeatabilityReport, ReportInputs, repeatability_report,
+};
 use super::scored_model::{ModelFamily, ScoredModel, active_effects, shaft_slip_info};
 use super::segmented_recording::{SegmentedRecording, have_several_speeds};
 use crate::claims::{self, Context, SIGNIFICANT_P_VALUE};
@@ -60,6 +62,9 @@ impl SetDiagnosis {
     pub fn compare_with_scenario(&mut self, scenario: &Scenario) {
         let d = &mut self.diagnosis;
         claims::compare_with_scenario(&mut d.base_parameters, scenario);
+        if d.verdict == Verdict::Parameters {
+            d.verdict = Verdict::None;
+        }
         claims::apply(d, &Context::default());
         d.grade = Some(grade(d, 0.0));
     }
@@ -76,7 +81,10 @@ pub fn diagnose_set(
     references: &ReferenceRecordings,
     mut progress: impl FnMut(&str),
 ) -> Option<SetDiagnosis> {
-    let instrument = InstrumentReport::assess(references, recordings, assumed.surface_m);
+    let mut instrument = InstrumentReport::assess(references, recordings, assumed.surface_m);
+    // What the scenario assumes is in the model; a correction would apply it twice.
+    let is_assumed = |id: &str| scenario.is_some_and(|s| s.effects.iter().any(|e| e.info().id == id));
+    instrument.detected.retain(|fault| !is_assumed(&fault.effect));
     let CalibratedRecordings { recordings: corrected, artefacts } = instrument.calibrate(recordings);
     let recordings: Vec<&SegmentedRecording> = corrected.iter().collect();
     let recordings = recordings.as_slice();
@@ -101,7 +109,13 @@ pub fn diagnose_set(
     };
     let repeats = repeatability_report(&inputs, ablation_rows(&candidates), instrument);
     let diagnosis = diagnosis(&candidates, recordings, assumed, &held_out, &repeats, &artefacts);
-    let extended = mean_scenario(name, &candidates.best.set_fit.fit.model, recordings, &repeats.instrument);
+    let mut extended =
+        mean_scenario(name, &candidates.best.set_fit.fit.model, recordings, &repeats.instrument);
+    if let Some(s) = scenario {
+        (extended.tolerance, extended.thickness_tolerance) = (s.tolerance, s.thickness_tolerance);
+        extended.surface_tolerance_m = s.surface_tolerance_m;
+        extended.candidates = s.candidates.clone();
+    }
     Some(SetDiagnosis {
         candidates,
         held_out,
@@ -200,7 +214,7 @@ fn diagnosis(
         .collect();
     causes.sort_by(|a, b| b.share.total_cmp(&a.share));
     for fault in &repeats.instrument.detected {
-        add_fault(&mut causes, fault.cause());
+        add_fault(&mut causes, fault.cause(), fault.is_corrected());
     }
     causes.extend(crate::sensor_artefact_causes::sensor_artefact_causes(artefacts, noise));
     let floor_n = mean.floor_n.unwrap_or(noise);
@@ -211,10 +225,7 @@ fn diagnosis(
         (beyond(mean.model_n) / beyond(mean.base_n).max(1e-12)).min(1.0)
     };
     let structure = residual_tests::test_residuals(&best.set_fit.fit, &best.set_fit.data).coloured_noise;
-    let unknown = share > MAX_UNEXPLAINED_SHARE
-        && mean.model_n > (1.0 + MAX_EXCESS_OVER_FLOOR) * floor_n
-        && mean.floor_n.is_some()
-        && structure.p_value < SIGNIFICANT_P_VALUE;
+    let unknown = is_unknown(share, mean, structure.p_value);
     let verdict = match (unknown, causes.is_empty()) {
         (true, _) => Verdict::Unknown,
         (false, true) => Verdict::None,
@@ -274,15 +285,25 @@ fn diagnosis(
     diagnosis
 }
 
-/// Adds a fault that was corrected in the recordings. Where the model has the same effect for what the correction left, as of a drift, both are one
-/// cause, or none if their sum may be zero.
-fn add_fault(causes: &mut Vec<Cause>, fault: Cause) {
+/// Whether a share of the base law's error and an excess over the floor are left by residuals that depend on a feature (`p_value`).
+fn is_unknown(share: f64, mean: &MeanReport, p_value: f64) -> bool {
+    share > MAX_UNEXPLAINED_SHARE
+        && mean.floor_n.is_some_and(|floor_n| mean.model_n > (1.0 + MAX_EXCESS_OVER_FLOOR) * floor_n)
+        && p_value < SIGNIFICANT_P_VALUE
+}
+
+/// Adds a fault of the instrument. Where the model has the same effect for what a correction left, as of a drift, both are one cause, or none if their
+/// sum may be zero.
+fn add_fault(causes: &mut Vec<Cause>, fault: Cause, is_corrected: bool) {
     let Some(k) = causes.iter().position(|c| c.effect == fault.effect) else {
         causes.push(fault);
         return;
     };
     let cause = &mut causes[k];
     cause.confidence = cause.confidence.max(fault.confidence);
+    if !is_corrected {
+        return;
+    }
     for (path, corrected) in fault.parameters {
         if let Some(e) = cause.parameters.get_mut(&path) {
             (e.value, e.low, e.high) =

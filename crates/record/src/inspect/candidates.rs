@@ -474,7 +474,10 @@ fn translation(head: TableHead<'_>, scan: &Scan, free: &[usize]) -> Option<Vec<u
             && (*at..at + ELEMENTS).all(|k| free.contains(&k) && stem(k) == stem(*at))
             && scan.columns[at + ELEMENTS - 1].is_constant_at(1.0)
     };
-    free.iter().copied().filter(is_matrix).find_map(|start| {
+    // A commanded pose has a longer name, such as `O_T_EE_d`.
+    let mut starts: Vec<usize> = free.iter().copied().filter(is_matrix).collect();
+    starts.sort_by_key(|at| stem(*at).len());
+    starts.into_iter().find_map(|start| {
         let of = |elements: [usize; 3]| elements.map(|k| start + k);
         let (last_by_columns, last_by_rows) = (of([3, 7, 11]), of([12, 13, 14]));
         let are_zero = |part: [usize; 3]| part.iter().all(|at| scan.columns[*at].is_constant_at(0.0));

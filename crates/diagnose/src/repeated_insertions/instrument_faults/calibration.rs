@@ -57,9 +57,7 @@ impl InstrumentReport {
 
     /// Corrected faults as effects of a simulation, without tones (which block means remove) and drive friction.
     pub(crate) fn correctable_effects(&self) -> Vec<AnyEffect> {
-        let correctable =
-            |e: &AnyEffect| !matches!(e, AnyEffect::PeriodicInterference(_) | AnyEffect::DriveFriction(_));
-        self.detected.iter().filter_map(|s| s.effect_model.clone()).filter(correctable).collect()
+        self.detected.iter().filter(|s| s.is_corrected()).filter_map(|s| s.effect_model.clone()).collect()
     }
 
     /// Corrects the force of a recording; `drift_n_per_s` is its own drift, if known.

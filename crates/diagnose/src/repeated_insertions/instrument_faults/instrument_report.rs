@@ -58,6 +58,14 @@ pub struct DetectedFault {
 }
 
 impl DetectedFault {
+    /// Whether the recordings are corrected for it; block means remove tones, and drive friction stays.
+    #[must_use]
+    pub fn is_corrected(&self) -> bool {
+        let stays =
+            |e: &AnyEffect| matches!(e, AnyEffect::PeriodicInterference(_) | AnyEffect::DriveFriction(_));
+        self.effect_model.as_ref().is_some_and(|e| !stays(e))
+    }
+
     /// The fault as a cause of a diagnosis.
     #[must_use]
     pub fn cause(&self) -> Cause {

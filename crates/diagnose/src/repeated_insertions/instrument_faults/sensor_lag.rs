@@ -165,7 +165,7 @@ impl<'a> Corner<'a> {
         let end = r.time_s.partition_point(|t| *t < to_s);
         // A rupture inside the window would disturb the fit, also one that appears delayed.
         let torn = run.ruptures_s.iter().any(|t| (from_s - MAX_LAG_S..to_s).contains(t));
-        let even = is_even(r, from_s, if at == CornerKind::Stop { stop_s } else { at_s - STANDSTILL_S });
+        let even = is_even(r, from_s, at_s - STANDSTILL_S);
         let turned_m = r.position_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         (alone && even && !torn && end - first > 4 * REGRESSORS).then(|| Self {
             name: &run.name,

@@ -73,8 +73,8 @@ pub(super) fn causes(study: &SetDiagnosis) -> Section {
     );
     Section::new("Causes and their improvement")
         .text(
-            "Three laws were fitted: the base law; the base law with the effects that the search adds; and layers that stick to \
-             the shaft, slip, yield with a delay and release. The law with the smallest cross-validated error was selected: an \
+            "The laws fitted: the base law; the base law with the effects that the search adds, if any; and, where these leave more \
+             than noise, layers that stick to the shaft, slip, yield with a delay and release. The law with the smallest cross-validated error was selected: an \
              extension only when it improves on the base law by 2 % or more, and more than two effects of the library only when \
              they improve on the slipping shaft by 10 %. Each part of the selected law was then removed in turn, and stayed \
              removed where the error on held-out recordings and speeds rises by less than 5 % (1 % for a parameter that only \

@@ -78,7 +78,10 @@ pub fn summary_sentence(study: &SetDiagnosis) -> String {
                 off.join("; ")
             )
         }
-        (_, true) => "The base law predicts new insertions as well as any extension of it.".to_owned(),
+        (_, true) => {
+            let model = if study.mean_scenario.effects.is_empty() { "base law" } else { "assumed model" };
+            format!("The {model} predicts new insertions as well as any extension of it.")
+        }
         (_, false) => format!("The simulation lacks {}.", names.join(", ")),
     };
     text + &but
