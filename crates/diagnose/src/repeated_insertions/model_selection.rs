@@ -6,7 +6,7 @@ use super::scored_model::{ModelFamily, ScoredModel, active_effects};
 use super::segmented_recording::{SegmentedRecording, group_by_speed_and_stroke};
 use super::start_values::base_law_prior;
 use super::stick_slip_fit::fit_stick_slip;
-use crate::base_law_fit::{PreparedRecordings, assumptions_of, leaves_noise, roughness};
+use crate::base_law_fit::{PreparedRecordings, assumptions_of, roughness};
 use crate::measured_start::search_from_any_start;
 use rand::rngs::ChaCha8Rng;
 use std::sync::Arc;
@@ -78,10 +78,10 @@ pub fn select_model(
         .then(|| on(&search.best.model))
         .flatten()
         .map(|f| ScoredModel::new(ModelFamily::Library, f, recordings));
-    // Where only noise is left, there is nothing that another mechanism could explain; assumed effects are no part of the stick-slip model.
-    let explained = &library.as_ref().unwrap_or(&base).set_fit;
-    let is_tried =
-        scenario.is_none_or(|s| s.effects.is_empty()) && !leaves_noise(&explained.fit, &explained.data);
+    // Where only noise is left, there is nothing that another mechanism could explain; steps of the sensor zero are not kept. Assumed effects
+    // are no part of the stick-slip model.
+    let is_explained = search.leaves_noise(&search.best) && search.best.model.zero_step_count() == 0;
+    let is_tried = !is_explained && scenario.is_none_or(|s| s.effects.is_empty());
     let slip = is_tried
         .then(|| {
             progress("fitting the stick-slip model from several starts");
