@@ -142,10 +142,10 @@ pub fn diagnose_repeats(
     let mut study =
         diagnose_set(&set.name, &set.tissue, set.scenario.as_ref(), &refs, &checks, &mut *progress)
             .ok_or_else(|| Error::internal("no model could be fitted to these recordings"))?;
-    progress("model selection without parts of the set");
     if let Some(scenario) = &set.scenario {
         study.compare_with_scenario(scenario);
     }
+    progress("model selection without parts of the set");
     study.run_nested_cross_validation();
     if !set.parts.is_empty() {
         progress("composition of layers measured separately");

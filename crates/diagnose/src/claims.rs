@@ -166,8 +166,8 @@ fn parameters_at_bound(d: &Diagnosis) -> Vec<String> {
 /// Compares the fitted parameters with the scenario's values and tolerances, even if the fit started from others.
 pub(crate) fn compare_with_scenario(parameters: &mut [BaseParameter], scenario: &Scenario) {
     // Fronts are compared relative to the surface, which is reported itself.
-    let surface_m = parameters.iter().find(|b| b.name == "surface_m").map(|b| b.value);
-    let shift_m = surface_m.map_or(0.0, |m| m - scenario.tissue.surface_m);
+    let surface = parameters.iter().find(|b| b.name == "surface_m");
+    let surface_m = surface.map_or(scenario.tissue.surface_m, |b| b.value);
     for b in parameters {
         let layer = b.layer.checked_sub(1).and_then(|l| scenario.tissue.layers.get(l));
         let (assumed, tolerance) = match (b.name.as_str(), layer) {
@@ -184,10 +184,7 @@ pub(crate) fn compare_with_scenario(parameters: &mut [BaseParameter], scenario: 
             // The front of the first layer is the surface.
             ("front_m", Some(_)) if b.layer > 1 => {
                 let depth_m = scenario.tissue.front_m(b.layer - 1) - scenario.tissue.surface_m;
-                (
-                    scenario.tissue.surface_m + shift_m + depth_m,
-                    scenario.surface_tolerance_m + scenario.thickness_tolerance * depth_m,
-                )
+                (surface_m + depth_m, scenario.surface_tolerance_m + scenario.thickness_tolerance * depth_m)
             }
             ("surface_m", _) => (scenario.tissue.surface_m, scenario.surface_tolerance_m),
             _ => continue,

@@ -9,6 +9,7 @@ mod summary_sentence;
 
 pub(crate) use parameter_labels::label_cell;
 pub use parameter_labels::{different_recordings, undetermined_parameters};
+pub(crate) use summary_sentence::wrong_numbers;
 pub use summary_sentence::{
     findings, general_forms, lower_limits, partial_model, proposed_formula, recording_differences,
     summary_sentence, unneeded_custom_effects,

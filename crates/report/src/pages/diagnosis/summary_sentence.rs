@@ -107,6 +107,13 @@ pub(super) fn lower_limit(b: &BaseParameter) -> String {
     format!("at least {} N", significant(b.low, 3))
 }
 
+/// The sentence of the verdict `parameters`.
+pub(crate) fn wrong_numbers(d: &Diagnosis) -> String {
+    let is_off = |f: &&Finding| matches!(f.kind, FindingKind::OutOfTolerance | FindingKind::LayerCount);
+    let off: Vec<&str> = d.findings.iter().filter(is_off).map(|f| f.message.as_str()).collect();
+    format!("No effect of the library is missing, but numbers of the scenario are wrong: {}.", off.join("; "))
+}
+
 fn verdict(d: &Diagnosis) -> String {
     let names = || d.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>().join(" and ");
     match d.verdict {
@@ -119,16 +126,7 @@ fn verdict(d: &Diagnosis) -> String {
             let but = first.map_or_else(String::new, |f| format!(", but {}", f.message));
             format!("No effect of the library is needed beyond the base law{but}.")
         }
-        Verdict::Parameters => {
-            let is_off =
-                |f: &&Finding| matches!(f.kind, FindingKind::OutOfTolerance | FindingKind::LayerCount);
-            let off = d.findings.iter().filter(is_off);
-            let off: Vec<&str> = off.map(|f| f.message.as_str()).collect();
-            format!(
-                "No effect of the library is missing, but numbers of the scenario are wrong: {}.",
-                off.join("; ")
-            )
-        }
+        Verdict::Parameters => wrong_numbers(d),
         Verdict::Named => format!("The simulation lacks {}.", names()),
         Verdict::Ambiguous => {
             let class = |c: &Cause| {

@@ -9,13 +9,13 @@ mod recording_variation;
 pub use fitted_law::ablation_figure;
 
 use crate::page_model::{Page, Section, Status, Tile};
-use crate::pages::diagnosis::findings;
+use crate::pages::diagnosis::{findings, wrong_numbers};
 use crate::pages::formatting::{data_quality_table, three_decimals};
 use fitted_law::{causes, extended_law};
 use held_out_prediction::{held_out_predictions, residual_charts};
 use recording_variation::{between_recordings, measurement_chain};
 use stylet_diagnose::claims::contradicts;
-use stylet_diagnose::diagnosis_json::{FindingKind, Verdict};
+use stylet_diagnose::diagnosis_json::Verdict;
 use stylet_diagnose::repeated_insertions::SegmentedRecording;
 use stylet_diagnose::repeated_insertions::dataset::Dataset;
 use stylet_diagnose::repeated_insertions::diagnose_set::SetDiagnosis;
@@ -70,14 +70,7 @@ pub fn summary_sentence(study: &SetDiagnosis) -> String {
             "The insertions hold structure that no effect of the library explains; in addition the simulation lacks {}.",
             names.join(", ")
         ),
-        (Verdict::Parameters, _) => {
-            let off = d.findings.iter().filter(|f| f.kind == FindingKind::OutOfTolerance);
-            let off: Vec<&str> = off.map(|f| f.message.as_str()).collect();
-            format!(
-                "No effect of the library is missing, but numbers of the scenario are wrong: {}.",
-                off.join("; ")
-            )
-        }
+        (Verdict::Parameters, _) => wrong_numbers(d),
         (_, true) => {
             let model = if study.mean_scenario.effects.is_empty() { "base law" } else { "assumed model" };
             format!("The {model} predicts new insertions as well as any extension of it.")
