@@ -1,6 +1,5 @@
-//! Time of a physics step of the arm: rapier's multibody, control, disturbance observer, tissue law
-//! and virtual sensor; and MuJoCo's `mj_step` of the same arm (rigid bodies only) in the same
-//! run, as a ratio.
+//! Time of a physics step of the arm: dynamics in joint coordinates (and as a rapier multibody, the reference), control, disturbance observer,
+//! tissue law and virtual sensor; and MuJoCo's `mj_step` of the same arm (rigid bodies only) in the same run, as a ratio.
 //!
 //! Run with `STYLET_PEERS_PYTHON=.../venv/bin/python cargo bench --bench arm`, the path being that of a
 //! Python that has the package `mujoco`; without it the comparison is skipped, loudly.
@@ -14,13 +13,11 @@ use std::process::Command;
 use std::time::Instant;
 use stylet_dynamics::{Arm, EARTH_GRAVITY_MPS2, JointVector, RigidBody, panda};
 use stylet_scenario::{ArmConfig, ArmInsertionLine, MotionPlan, Scenario, VirtualSensor};
-use stylet_testbed::{ArmSimulation, RapierArm};
+use stylet_testbed::{ArmBody, ArmSimulation, JointSpaceArm, RapierArm};
 use stylet_tissue::{ForceLaw, ForceLawState};
 
 const DT_S: f64 = 1e-3;
 const STEPS: usize = 2000;
-/// The bar for arm, control and observer together.
-const BAR_US: f64 = 25.0;
 
 struct Insertion {
     plan: MotionPlan,
@@ -42,11 +39,11 @@ fn insertion() -> Result<Insertion, Box<dyn std::error::Error>> {
 
 /// Everything: the arm carries the needle into the tissue, both observers listen; the virtual sensor's
 /// force is asked for at every fifth step.
-fn whole(i: &Insertion, sensor: bool) -> f64 {
+fn whole<Body: ArmBody>(i: &Insertion, sensor: bool) -> f64 {
     let first = i.plan.at(0.0);
     let sensor = sensor.then_some(&i.sensor);
     let config = ArmConfig::default();
-    let rig = ArmSimulation::new(&config, sensor, &i.line, &first, first.position_m, DT_S, 1);
+    let rig = ArmSimulation::<Body>::new(&config, sensor, &i.line, &first, first.position_m, DT_S, 1);
     let Ok(mut rig) = rig else { return f64::NAN };
     let mut state = ForceLawState::default();
     let mut sum = 0.0;
@@ -61,20 +58,18 @@ fn whole(i: &Insertion, sensor: bool) -> f64 {
     sum
 }
 
-/// rapier alone, under the torques that hold the arm's weight at the start.
-fn rapier_alone(arm: &Arm<7>) -> f64 {
+/// The arm alone, under the torques that hold its weight at the start.
+fn alone<Body: ArmBody>(arm: &Arm<7>) -> f64 {
     let still = JointVector::zeros();
-    let Ok(mut body) = RapierArm::new(arm, &panda::READY_RAD, &still, DT_S) else { return f64::NAN };
-    let at = arm.at(&panda::READY_RAD);
-    let (frames, tip) = (at.link_poses(), at.tip().position_m);
-    let weight = at.gravity_torques(&EARTH_GRAVITY_MPS2);
+    let Ok(mut body) = Body::new(arm, &panda::READY_RAD, &still, DT_S) else { return f64::NAN };
+    let weight = arm.at(&panda::READY_RAD).gravity_torques(&EARTH_GRAVITY_MPS2);
     for _ in 0..STEPS {
-        body.step(&frames, &weight, &tip, &Vector3::zeros());
+        body.step(&arm.at(&body.joints().0), &weight, &Vector3::zeros());
     }
     body.joints().0.sum()
 }
 
-fn us_per_step(f: &mut dyn FnMut() -> f64) -> f64 {
+fn us_per_step(f: &dyn Fn() -> f64) -> f64 {
     let start = Instant::now();
     black_box(f());
     start.elapsed().as_secs_f64() / STEPS as f64 * 1e6
@@ -157,42 +152,47 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut group = criterion.benchmark_group("arm_2000_steps");
     group.throughput(Throughput::Elements(STEPS as u64));
     group.sample_size(20);
-    group.bench_function("rapier_alone", |b| b.iter(|| rapier_alone(&arm)));
-    group.bench_function("with_control", |b| b.iter(|| whole(&insertion, false)));
-    group.bench_function("with_control_and_virtual_sensor", |b| b.iter(|| whole(&insertion, true)));
+    group.bench_function("arm_alone", |b| b.iter(|| alone::<JointSpaceArm>(&arm)));
+    group.bench_function("rapier_alone", |b| b.iter(|| alone::<RapierArm>(&arm)));
+    group.bench_function("with_control", |b| b.iter(|| whole::<JointSpaceArm>(&insertion, false)));
+    group.bench_function("with_control_and_virtual_sensor", |b| {
+        b.iter(|| whole::<JointSpaceArm>(&insertion, true));
+    });
     group.finish();
     criterion.final_summary();
 
     let python = std::env::var("STYLET_PEERS_PYTHON").ok();
-    let (mut alone, mut controlled, mut all, mut peer) = (vec![], vec![], vec![], vec![]);
+    let works: [(&str, &dyn Fn() -> f64); 5] = [
+        ("arm alone", &|| alone::<JointSpaceArm>(&arm)),
+        ("rapier alone", &|| alone::<RapierArm>(&arm)),
+        ("arm with control", &|| whole::<JointSpaceArm>(&insertion, false)),
+        ("arm with control and virtual sensor", &|| whole::<JointSpaceArm>(&insertion, true)),
+        ("the same with rapier", &|| whole::<RapierArm>(&insertion, true)),
+    ];
+    let (mut times, mut peer) = (vec![vec![]; works.len()], vec![]);
     for _ in 0..12 {
         for _ in 0..3 {
-            alone.push(us_per_step(&mut || rapier_alone(&arm)));
-            controlled.push(us_per_step(&mut || whole(&insertion, false)));
-            all.push(us_per_step(&mut || whole(&insertion, true)));
+            for (work, times) in works.iter().zip(&mut times) {
+                times.push(us_per_step(work.1));
+            }
         }
         if let Some(python) = &python {
             peer.extend(mujoco(python, &arm)?);
         }
     }
-    let best = all.iter().copied().fold(f64::INFINITY, f64::min);
-    let (alone, controlled, all) = (median(alone), median(controlled), median(all));
-    println!("arm, rapier alone: {alone:.1} us per step");
-    println!("arm with control: {controlled:.1} us per step");
-    println!(
-        "arm with control and virtual sensor: {all:.1} us per step, median ({best:.1} best; bar {BAR_US} us)"
-    );
+    for ((name, _), times) in works.iter().zip(&times) {
+        println!("{name}: {:.2} us per step, median", median(times.clone()));
+    }
     if peer.is_empty() {
         println!(
             "SKIPPED: the comparison with MuJoCo. Set STYLET_PEERS_PYTHON to a Python with the package `mujoco`."
         );
     } else {
         let peer = median(peer);
-        println!(
-            "MuJoCo mj_step of the same arm: {peer:.1} us per step; rapier alone {:.2} times that, all of ours {:.2} times",
-            alone / peer,
-            all / peer
-        );
+        println!("MuJoCo mj_step of the same arm: {peer:.2} us per step");
+        for ((name, _), times) in works.iter().zip(&times) {
+            println!("{name}: {:.2} times mj_step", median(times.clone()) / peer);
+        }
     }
     Ok(())
 }

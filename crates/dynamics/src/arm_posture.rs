@@ -40,7 +40,7 @@ impl<const N: usize> Arm<N> {
         self.model.links.map(|link| link.limits)
     }
 
-    /// The arm at joint angles `q_rad`: computes sines and cosines once for everything derived from it.
+    /// The arm at joint angles `q_rad`: computes sines, cosines and frames once for everything derived from it.
     pub fn at(&self, q_rad: &JointVector<N>) -> Posture<'_, N> {
         let mut rotations = [Matrix3::zeros(); N];
         for (i, rotation) in rotations.iter_mut().enumerate() {
@@ -49,7 +49,14 @@ impl<const N: usize> Arm<N> {
             let (x, y, z) = (fixed.column(0), fixed.column(1), fixed.column(2));
             *rotation = Matrix3::from_columns(&[x * c + y * s, y * c - x * s, z.into_owned()]);
         }
-        Posture { arm: self, rotations }
+        let mut links = [Pose::IDENTITY; N];
+        let mut pose = Pose::IDENTITY;
+        for (i, link) in links.iter_mut().enumerate() {
+            let position_m = self.model.links[i].placement.position_m;
+            pose = pose.compose(&Pose { rotation: rotations[i], position_m });
+            *link = pose;
+        }
+        Posture { arm: self, rotations, links }
     }
 }
 
@@ -59,12 +66,19 @@ pub struct Posture<'a, const N: usize> {
     pub(crate) arm: &'a Arm<N>,
     /// Link `i`'s orientation in link `i - 1`.
     pub(crate) rotations: [Matrix3<f64>; N],
+    /// Frames of all links in the base.
+    links: [Pose; N],
 }
 
 impl<const N: usize> Posture<'_, N> {
     /// The arm in this posture.
     pub fn arm(&self) -> &Arm<N> {
         self.arm
+    }
+
+    /// Frames of all links in the base.
+    pub fn link_poses(&self) -> &[Pose; N] {
+        &self.links
     }
 
     /// Origin of link `i`'s frame in link `i - 1`'s.

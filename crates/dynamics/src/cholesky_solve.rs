@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-/// `x` with `A x = b`, by `A = L L^T`. A matrix that is not positive definite gives numbers that are not
+/// `x` with `A x = b`, by `A = L L^T`; of `A` only the lower triangle is read. A matrix that is not positive definite gives numbers that are not
 /// finite.
 pub(crate) fn solve_spd<const D: usize>(
     mut a: SMatrix<f64, D, D>,

@@ -9,17 +9,6 @@ use nalgebra::{Matrix6, SMatrix, Vector3, Vector6};
 pub type Jacobian<const N: usize> = SMatrix<f64, 6, N>;
 
 impl<const N: usize> Posture<'_, N> {
-    /// Frames of all links in the base.
-    pub fn link_poses(&self) -> [Pose; N] {
-        let mut poses = [Pose::IDENTITY; N];
-        let mut pose = Pose::IDENTITY;
-        for (i, link) in poses.iter_mut().enumerate() {
-            pose = pose.compose(&Pose { rotation: self.rotations[i], position_m: *self.origin(i) });
-            *link = pose;
-        }
-        poses
-    }
-
     /// The tip's frame in the base.
     pub fn tip(&self) -> Pose {
         self.link_poses().last().unwrap_or(&Pose::IDENTITY).compose(&self.arm.tip)

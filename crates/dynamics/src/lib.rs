@@ -32,6 +32,7 @@ mod arm_posture;
 mod cholesky_solve;
 mod error;
 pub mod feasibility;
+mod forward_dynamics;
 pub mod friction;
 mod generalized_momentum;
 mod inverse_kinematics;

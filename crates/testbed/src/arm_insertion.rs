@@ -51,7 +51,8 @@ pub fn simulate_on_arm(
     let before = (line.approach.duration_s * physics_hz).ceil() as i64;
     let start_m = plan.at(0.0).position_m;
     let first = line.commanded_at(plan, -(before as f64) / physics_hz);
-    let mut rig = ArmSimulation::new(config, sensor, line, &first, start_m, 1.0 / physics_hz, seed)?;
+    let mut rig: ArmSimulation =
+        ArmSimulation::new(config, sensor, line, &first, start_m, 1.0 / physics_hz, seed)?;
 
     let mut zero = Zeroing::new(line.zero_window_s, physics_hz);
     let mut record = ArmRecording { zeroed_s: zero.until_s(physics_hz), ..ArmRecording::default() };

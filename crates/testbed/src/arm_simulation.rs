@@ -1,7 +1,8 @@
 //! One physics step of arm, controller and virtual sensor.
 
 use crate::computed_torque_control::LineController;
-use crate::rapier_arm::{ArmChainError, RapierArm};
+use crate::joint_space_arm::{ArmBody, JointSpaceArm};
+use crate::rapier_arm::ArmChainError;
 use crate::virtual_sensor::{AxialForceObserver, JointTorqueSensors};
 use nalgebra::Vector3;
 use stylet_dynamics::feasibility;
@@ -45,9 +46,9 @@ pub struct ArmStep {
 }
 
 /// The arm during an insertion.
-pub struct ArmSimulation {
+pub struct ArmSimulation<Body = JointSpaceArm> {
     arm: Arm<7>,
-    body: RapierArm,
+    body: Body,
     control: LineController,
     sensors: JointTorqueSensors,
     observer: Option<AxialForceObserver>,
@@ -56,7 +57,7 @@ pub struct ArmSimulation {
     dt_s: f64,
 }
 
-impl ArmSimulation {
+impl<Body: ArmBody> ArmSimulation<Body> {
     /// The arm at the start of its approach. `first` is the commanded point there, `start_m` the axial position at which the line starts.
     ///
     /// # Errors
@@ -80,7 +81,7 @@ impl ArmSimulation {
             &stylet_dynamics::IkConfig { restarts: 0, ..Default::default() },
         )?;
         let qd = control.start_rates(&arm, &q, first.velocity_mps);
-        let body = RapierArm::new(&arm, &q, &qd, dt_s)?;
+        let body = Body::new(&arm, &q, &qd, dt_s)?;
         let noise_nm = sensor.map_or(0.0, |s| s.torque_noise_nm);
         let observer = sensor.map(|s| AxialForceObserver::new(config, s)).transpose()?;
         let still = JointVector::zeros();
@@ -129,7 +130,7 @@ impl ArmSimulation {
             self.control.torque_nm(&at, &qd, &tip, &twist, &terms, plan, (&self.last.0, self.dt_s))?;
         feasibility::check_joint_torques(&self.arm, &driving)?;
         let reading = self.sensors.read(&driving, &qd);
-        self.body.step(&at.link_poses(), &driving, &tip.position_m, &(direction * -resistance_n));
+        self.body.step(&at, &driving, &(direction * -resistance_n));
         self.last = (driving, reading);
         Ok(ArmStep {
             q_rad: q,

@@ -1,4 +1,4 @@
-//! The arm as a rapier multibody: seven revolute joints, the links of `stylet-dynamics`, force/torque sensor and needle fixed to the last one.
+//! The arm as a rapier multibody, the reference for [`crate::JointSpaceArm`]: seven revolute joints, the links of `stylet-dynamics`, force/torque sensor and needle fixed to the last one.
 //!
 //! rapier has no input for joint torques: each is applied as a pair of opposite torques on a link and its parent. There are no colliders and no
 //! joint limits; an insertion that leaves the limits ends with [`crate::ArmError`]. rapier's default joint damping of 0.1 N m s/rad is removed. One

@@ -99,11 +99,8 @@ fn potential_energy(arm: &Arm<7>, q: &JointVector<7>) -> f64 {
     let at = arm.at(q);
     let poses = at.link_poses();
     let model = arm.model();
-    let links = model
-        .links
-        .iter()
-        .zip(&poses)
-        .map(|(l, pose)| l.body.mass_kg * pose.transform_point(&l.body.com_m).z);
+    let links =
+        model.links.iter().zip(poses).map(|(l, pose)| l.body.mass_kg * pose.transform_point(&l.body.com_m).z);
     let tool =
         model.tool.payload.in_parent_frame(&poses[6].compose(&model.flange).compose(&model.tool.mount));
     9.81 * (links.sum::<f64>() + tool.mass_kg * tool.com_m.z)

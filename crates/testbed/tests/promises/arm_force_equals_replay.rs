@@ -21,7 +21,7 @@ fn the_law_replayed_on_the_arms_motion_gives_the_arms_force() {
     let config = ArmConfig::default();
     let line = config.insertion_line(&plan, 0.0, 200.0, None).expect("reachable");
     let first = plan.at(0.0);
-    let mut rig =
+    let mut rig: ArmSimulation =
         ArmSimulation::new(&config, None, &line, &first, first.position_m, 1e-3, 1).expect("an arm");
 
     let (mut state, mut ruptures) = (ForceLawState::default(), 0);

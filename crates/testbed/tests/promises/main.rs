@@ -1,5 +1,6 @@
 //! Tests of the testbed, one file per promise; one program, because linking takes longer than testing.
 
+mod arm_equals_rapier;
 mod arm_follows_the_line;
 mod arm_force_equals_replay;
 mod common;

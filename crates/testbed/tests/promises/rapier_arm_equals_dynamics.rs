@@ -28,7 +28,7 @@ fn rapier_uses_the_mass_matrix_of_the_dynamics_crate() {
     for (q, qd, torque, push) in states() {
         let mut body = RapierArm::new(&arm, &q, &qd, 1e-3).expect("a chain");
         let at = arm.at(&q);
-        body.step(&at.link_poses(), &torque, &at.tip().position_m, &push);
+        body.step(at.link_poses(), &torque, &at.tip().position_m, &push);
         let inverse = body.inverse_mass_matrix().expect("seven coordinates");
         let identity = inverse * at.mass_matrix();
         worst = worst.max((identity - SMatrix::<f64, 7, 7>::identity()).amax());
@@ -46,7 +46,7 @@ fn rapier_gives_the_accelerations_of_the_dynamics_crate_under_torques_gravity_an
         for (q, qd, torque, push) in states() {
             let mut body = RapierArm::new(&arm, &q, &qd, dt).expect("a chain");
             let at = arm.at(&q);
-            body.step(&at.link_poses(), &torque, &at.tip().position_m, &push);
+            body.step(at.link_poses(), &torque, &at.tip().position_m, &push);
             let (q_after, qd_after) = body.joints();
             let bias = at.inverse_dynamics(
                 &qd,
@@ -73,7 +73,7 @@ fn a_supported_arm_hangs_still() {
         let (q, _) = body.joints();
         let at = arm.at(&q);
         body.step(
-            &at.link_poses(),
+            at.link_poses(),
             &at.gravity_torques(&EARTH_GRAVITY_MPS2),
             &at.tip().position_m,
             &Vector3::zeros(),
