@@ -1,7 +1,7 @@
 //! Promise: invalid input gives exit code 2 and a message with file, position and remedy, and writes no output; files in an
 //! existing output folder are kept.
 
-mod support;
+use crate::support;
 
 use std::fs;
 use std::path::Path;

@@ -1,6 +1,6 @@
 //! `stylet check` says before a diagnosis what recordings can show, and `diagnose` labels what they determined.
 
-mod support;
+use crate::support;
 
 use std::fs;
 use support::{Scratch, stderr_text, stylet, text};

@@ -1,7 +1,7 @@
 //! Promise: `stylet compare` runs several algorithms on the same insertions and writes the table as a page and as `compare.json`, with
 //! the same bytes for any number of threads.
 
-mod support;
+use crate::support;
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! Promise: an effect given by a formula is simulated, found, reported and read again like an effect of the library; among the candidates
 //! of recordings without it, it is not named; and a formula that cannot be right is refused at its place, whatever its parameters.
 
-mod support;
+use crate::support;
 
 use stylet_diagnose::{NamedRecording, Options, Verdict};
 use stylet_scenario::{InputError, Scenario};

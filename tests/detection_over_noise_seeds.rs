@@ -3,9 +3,9 @@
 //!
 //! Prints the distributions together with the reference values for the same cases (surface known, the sinusoid from full speed), and
 //! whether they are met:
-//! `cargo test --release --test detection_over_noise_seeds -- --nocapture`.
+//! `cargo test --release --test promises detection_over_noise_seeds -- --nocapture`.
 
-mod support;
+use crate::support;
 
 use rayon::prelude::*;
 use stylet_core::config::{Algorithm, Contact, EnhanceConfig, Model, Reset};

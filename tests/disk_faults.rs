@@ -7,7 +7,7 @@
 
 #[path = "disk_faults/server.rs"]
 mod server;
-mod support;
+use crate::support;
 
 use server::{Outcome, Server, preloaded, shim};
 use std::collections::BTreeMap;

@@ -1,7 +1,7 @@
 //! Promise: `stylet enhance LOG --model EXTENDED.ron` uses the friction of an identified model and names it in every result; invalid
 //! models and algorithms without model are refused with file, place and remedy.
 
-mod support;
+use crate::support;
 
 use std::fs;
 use support::{Scratch, scenario, stderr_text, stylet};

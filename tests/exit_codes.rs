@@ -1,7 +1,7 @@
 //! Every command ends with a message and its documented exit code: closed pipes, full disks behind standard output, errors in very long
 //! lines, work above the limits. Nothing panics (exit code 101).
 
-mod support;
+use crate::support;
 
 use std::fs::File;
 use std::process::{Command, Stdio};

@@ -1,7 +1,7 @@
 //! `stylet identify` finds the layers of a phantom without a scenario and writes them as one; it replaces no file that is not its
 //! own. `diagnose` without a scenario starts from the same layers.
 
-mod support;
+use crate::support;
 
 use std::fs;
 use stylet::Scenario;

@@ -1,6 +1,6 @@
 //! Promise: `stylet listen` loses no sample, gives the outputs of the core, and is not slowed by a stalled subscriber. The long
 //! form (60 s at 1 kHz, a browser connection that stalls for 10 s):
-//! `cargo test --release --test listen -- --ignored --nocapture`.
+//! `cargo test --release --test promises listen -- --ignored --nocapture`.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpStream, UdpSocket};

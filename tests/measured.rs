@@ -4,7 +4,7 @@
 //! The recordings have no licence and stay outside the repository, in the folder that `STYLET_MEASURED`
 //! names; without it these tests are skipped.
 
-mod support;
+use crate::support;
 
 use std::path::PathBuf;
 use support::{Scratch, stderr_text, stylet};

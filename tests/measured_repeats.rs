@@ -3,7 +3,7 @@
 //!
 //! The recordings stay outside the repository; tests without them print that they were skipped.
 
-mod support;
+use crate::support;
 
 use std::path::Path;
 use std::sync::OnceLock;

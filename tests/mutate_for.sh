@@ -10,10 +10,10 @@ rounds=0
 seed=${STYLET_MUTATION_SEED:-1000}
 found=$(mktemp)
 trap 'rm -f "$found"' EXIT
-cargo test --release --test mutated_inputs --no-run
+cargo test --release --test promises --no-run
 until [ "$rounds" -gt 0 ] && [ "$SECONDS" -ge "$seconds" ]; do
     STYLET_MUTATION_SEED=$seed STYLET_MUTATIONS=${STYLET_MUTATIONS:-1000} \
-        cargo test --quiet --release --test mutated_inputs -- --nocapture --test-threads 1 >>"$found" ||
+        cargo test --quiet --release --test promises mutated_inputs:: -- --nocapture --test-threads 1 >>"$found" ||
         { tail -n 20 "$found"; echo "seed $seed: see target/mutated" >&2; exit 1; }
     rounds=$((rounds + 1))
     seed=$((seed + 1))

@@ -4,7 +4,7 @@
 
 #[path = "mutated/mutate.rs"]
 mod mutate;
-mod support;
+use crate::support;
 
 use mutate::{Random, Target, fuzz, fuzz_any};
 use std::path::Path;

@@ -17,11 +17,11 @@ for ((seed = first; seed < first + rounds; seed++)); do
             exit 1
         }
     done <<'CRATES'
-tissue --test base_law --test effect_library --test measurement_chain --test needle_compliance --test shaft_slip
-plan --test motion_limits
-sweep --test distributions
+tissue --test promises -- base_law:: effect_library:: measurement_chain:: needle_compliance:: shaft_slip::
+plan --test promises motion_limits::
+sweep --test promises distributions::
 scenario --lib --test promises
-record --lib --test reading --test round_trip
+record --lib --test promises -- reading:: round_trip:: tests::
 core --test promises estimation
 CRATES
 done

@@ -1,6 +1,6 @@
 //! `docs/reference/files.md` names every key and column of the files that `run`, `enhance`, `diagnose` and `identifiability` write.
 
-mod support;
+use crate::support;
 
 use serde_json::Value;
 use std::collections::BTreeSet;

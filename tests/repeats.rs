@@ -1,7 +1,7 @@
 //! Promise: `stylet diagnose --repeats` answers as a diagnosis of single recordings: wrong numbers of the scenario are named, and no cause;
 //! a hidden effect is named; the extended model needs no other effect.
 
-mod support;
+use crate::support;
 
 use support::{Scratch, stderr_text, stylet, text};
 

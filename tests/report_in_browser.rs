@@ -5,7 +5,7 @@
 #[allow(dead_code)]
 #[path = "../crates/report/tests/support/browser.rs"]
 mod browser;
-mod support;
+use crate::support;
 
 use std::io::Write;
 use support::{scenario, stylet};

@@ -4,7 +4,7 @@
 //! `tests/expected_verdicts.json` holds verdicts, numbers and reasons for four noise seeds and what the algorithm's
 //! switches do on them, which are run here, and verdicts and primary effects for two disjoint sets of fifty. The latter are run again, and the file is
 //! written, with
-//! `STYLET_RECORD=1 cargo test --release --test reproduced_claims -- --ignored`; without the variable they are
+//! `STYLET_RECORD=1 cargo test --release --test promises reproduced_claims -- --ignored`; without the variable they are
 //! held against it. Understand a change before recording it.
 
 use serde_json::{Value, json};

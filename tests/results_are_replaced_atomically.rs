@@ -2,7 +2,7 @@
 //! one in its folder leaves the old set or the new one, never a mixture; the files with inputs and results
 //! always belong together.
 
-mod support;
+use crate::support;
 
 use std::collections::BTreeMap;
 use std::fs;

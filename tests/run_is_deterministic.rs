@@ -1,7 +1,7 @@
 //! The same scenario and seed give the same bytes in every file, also in a second process, and the same hash in `score.json`; another
 //! seed gives others.
 
-mod support;
+use crate::support;
 
 use std::fs;
 use support::{Scratch, scenario, stylet};

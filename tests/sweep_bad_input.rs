@@ -1,7 +1,7 @@
 //! Promise: an invalid sweep, a damaged shard, a full disk or a read-only folder gives an error message that names it and exit code 2,
 //! and existing files are kept.
 
-mod support;
+use crate::support;
 
 use std::fs;
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! Promise: `stylet gate` has exit code 1 for a degraded algorithm and 0 for the shipped one with any seed; it reports changes against
 //! the baseline and writes JUnit and JSON.
 
-mod support;
+use crate::support;
 
 use std::fs;
 use support::{Scratch, root, stderr_text, stylet};

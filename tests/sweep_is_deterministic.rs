@@ -1,7 +1,7 @@
 //! Promise: a sweep gives the same bytes for any number of threads, for any split into shards, and when resumed after SIGKILL or
 //! Ctrl-C. Repeating one trial gives the scores of its row.
 
-mod support;
+use crate::support;
 
 use std::fs;
 use std::os::unix::process::ExitStatusExt;

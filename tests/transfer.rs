@@ -2,7 +2,7 @@
 //! model, names none for a group with the same law, and recognises another law; `stylet plan --transfer MODEL` says how many recordings of
 //! another group its prediction needs.
 
-mod support;
+use crate::support;
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! `enhance`, `diagnose`, repeats and data sets report an unusable recording with the same message and remedy, before any cause is
 //! identified, and repair and downsample recordings in every command.
 
-mod support;
+use crate::support;
 
 use std::fmt::Write as _;
 use std::fs;

@@ -139,9 +139,8 @@ pub fn diagnose_repeats(
     let known = load.as_ref().zip(set.load.as_ref()).map(|(r, l)| (r, l.force_n));
     let refs: Vec<&SegmentedRecording> = runs.iter().collect();
     let checks = ReferenceRecordings { air: air.as_ref(), load: known };
-    let mut study =
-        diagnose_set(&set.name, &set.tissue, set.scenario.as_ref(), &refs, &checks, &mut *progress)
-            .ok_or_else(|| Error::internal("no model could be fitted to these recordings"))?;
+    let mut study = diagnose_set(&set.name, &set.tissue, set.scenario.as_ref(), &refs, &checks, progress)
+        .ok_or_else(|| Error::internal("no model could be fitted to these recordings"))?;
     if let Some(scenario) = &set.scenario {
         study.compare_with_scenario(scenario);
     }

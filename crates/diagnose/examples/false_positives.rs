@@ -28,8 +28,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let Arguments { file, set, measured, sets, seed } = parse_arguments(40, SEED)?;
     let layers = set.tissue.layers.len();
     let refs: Vec<&SegmentedRecording> = measured.iter().collect();
-    let found = diagnose_set(&set.name, &set.tissue, None, &refs, &ReferenceRecordings::default(), |_| {})
-        .ok_or("no model")?;
+    let found =
+        diagnose_set(&set.name, &set.tissue, None, &refs, &ReferenceRecordings::default(), &mut |_| {})
+            .ok_or("no model")?;
     let true_effects = active_effects(&found.candidates.best.set_fit.fit.model);
     // The population without sampling uncertainty.
     let population =
@@ -61,7 +62,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             .collect();
         let refs: Vec<&SegmentedRecording> = recordings.iter().collect();
         let Some(s) =
-            diagnose_set(&set.name, &set.tissue, None, &refs, &ReferenceRecordings::default(), |_| {})
+            diagnose_set(&set.name, &set.tissue, None, &refs, &ReferenceRecordings::default(), &mut |_| {})
         else {
             println!("{k}: no model");
             continue;

@@ -68,7 +68,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             None,
             &refs,
             &ReferenceRecordings::default(),
-            |_| {},
+            &mut |_| {},
         ) else {
             println!("{what}: no model");
             continue;

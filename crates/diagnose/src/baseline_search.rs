@@ -45,9 +45,9 @@ impl EffectSearch {
         prepared: &PreparedRecordings,
         base: Fit,
         data: FitData,
-        progress: &mut impl FnMut(&str),
+        progress: &mut dyn FnMut(&str),
     ) -> Self {
-        let one_more = |mut found: Self, progress: &mut _| {
+        let one_more = |mut found: Self, progress: &mut dyn FnMut(&str)| {
             let most = found.search.best.model.effects.len() + 1;
             found.search.add_effects(most, &found.prepared, progress);
             found
@@ -66,7 +66,7 @@ impl EffectSearch {
     }
 
     /// Searches for further effects. A search without a baseline that leaves structure is compared with one from a baseline with full effort.
-    pub(crate) fn complete(mut self, progress: &mut impl FnMut(&str)) -> (Search, PreparedRecordings) {
+    pub(crate) fn complete(mut self, progress: &mut dyn FnMut(&str)) -> (Search, PreparedRecordings) {
         self.add_further(progress);
         if let Some((base, data)) = self.base.clone()
             && !self.search.leaves_noise(&self.search.best)
@@ -104,7 +104,7 @@ impl EffectSearch {
         Self { search: Search { base, stages, ..Search::start(fit, data) }, prepared, base: None }
     }
 
-    fn add_further(&mut self, progress: &mut impl FnMut(&str)) {
+    fn add_further(&mut self, progress: &mut dyn FnMut(&str)) {
         self.search.add_effects(MAX_EFFECTS, &self.prepared, progress);
         self.search.finish(&self.prepared);
         if self.base.is_none() {

@@ -75,7 +75,7 @@ pub(crate) fn diagnose_given_layers(
     recordings: &[NamedRecording],
     options: &Options,
     replayed: &ReplayCount,
-    mut progress: impl FnMut(&str),
+    progress: &mut dyn FnMut(&str),
 ) -> Result<DiagnosisResult, DiagnoseError> {
     let mut check = Vec::new();
     let force_ratios = match check_recordings(scenario, recordings) {
@@ -102,7 +102,7 @@ pub(crate) fn diagnose_given_layers(
     let (prepared, tones) = prepare(scenario, &mut clean, &raw, replayed);
     let one_motion = have_one_motion(&clean);
     let (mut search, prepared) =
-        search_from_any_start(prepared, &clean, &mut progress).ok_or(DiagnoseError::NoFit)?;
+        search_from_any_start(prepared, &clean, progress).ok_or(DiagnoseError::NoFit)?;
     let mut is_search_limit_reached = prepared.is_search_limit_reached();
     let mut competing = find_competing_effects(&mut search);
     progress("assessing the residual");
@@ -279,7 +279,7 @@ pub(crate) fn diagnose_given_layers(
 
 impl DiagnosisResult {
     /// Adds formulas for the residual, if the library does not explain it.
-    pub(crate) fn with_proposals(mut self, options: &Options, progress: impl FnMut(&str)) -> Self {
+    pub(crate) fn with_proposals(mut self, options: &Options, progress: &mut dyn FnMut(&str)) -> Self {
         if self.diagnosis.verdict == Verdict::Unknown && !options.brief {
             let model = reported_model(&self.search, &self.diagnosis);
             let held_out_n = self.diagnosis.gain.rmse_after_n;
@@ -313,7 +313,7 @@ pub(crate) fn simple_explanation(
     scenario: &Scenario,
     recordings: &[NamedRecording],
     replayed: &ReplayCount,
-    progress: &mut impl FnMut(&str),
+    progress: &mut dyn FnMut(&str),
 ) -> Option<Fit> {
     let CleanRecordings { mut recordings, raw, .. } = clean_recordings(recordings);
     let (prepared, _) = prepare(scenario, &mut recordings, &raw, replayed);

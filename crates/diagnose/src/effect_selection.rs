@@ -56,7 +56,7 @@ impl Search {
         &mut self,
         max_effects: usize,
         prepared: &PreparedRecordings,
-        progress: &mut impl FnMut(&str),
+        progress: &mut dyn FnMut(&str),
     ) {
         while self.best.model.effects.len() < max_effects && !prepared.is_search_limit_reached() {
             let another = if self.best.model.effects.is_empty() { "an" } else { "another" };

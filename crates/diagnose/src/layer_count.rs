@@ -26,15 +26,16 @@ pub fn identify(
     options: &Options,
     mut progress: impl FnMut(&str),
 ) -> Result<(Scenario, DiagnosisResult), DiagnoseError> {
+    let progress: &mut dyn FnMut(&str) = &mut progress;
     progress("looking for layers");
     let scenario = scenario_from_recordings(name, recordings, layers)?;
     let replayed = ReplayCount::default();
     if layers.is_some() {
-        let result = diagnose_given_layers(&scenario, recordings, options, &replayed, &mut progress)?;
+        let result = diagnose_given_layers(&scenario, recordings, options, &replayed, progress)?;
         return Ok((scenario, result.with_proposals(options, progress)));
     }
     let (scenario, result) =
-        diagnose_without_empty_layer(scenario, recordings, options, &replayed, &mut progress)?;
+        diagnose_without_empty_layer(scenario, recordings, options, &replayed, progress)?;
     Ok((scenario, result.with_proposals(options, progress)))
 }
 
@@ -51,7 +52,7 @@ pub fn diagnose(
     mut progress: impl FnMut(&str),
 ) -> Result<DiagnosisResult, DiagnoseError> {
     let result = diagnose_with_layers_of_data(scenario, recordings, options, &mut progress)?;
-    Ok(result.with_proposals(options, progress))
+    Ok(result.with_proposals(options, &mut progress))
 }
 
 /// As [`diagnose`], without proposed formulas.
@@ -59,10 +60,10 @@ fn diagnose_with_layers_of_data(
     scenario: &Scenario,
     recordings: &[NamedRecording],
     options: &Options,
-    mut progress: &mut impl FnMut(&str),
+    progress: &mut dyn FnMut(&str),
 ) -> Result<DiagnosisResult, DiagnoseError> {
     let replayed = ReplayCount::default();
-    let result = diagnose_given_layers(scenario, recordings, options, &replayed, &mut progress)?;
+    let result = diagnose_given_layers(scenario, recordings, options, &replayed, progress)?;
     let is_contradicted = |d: &Diagnosis| {
         d.verdict == Verdict::Unknown || d.findings.iter().any(|f| claims::contradicts(f.kind))
     };
@@ -70,14 +71,14 @@ fn diagnose_with_layers_of_data(
         return Ok(result);
     }
     progress("looking for another number of layers");
-    let Some(start) = other_layers(scenario, recordings, &replayed, &mut progress) else {
+    let Some(start) = other_layers(scenario, recordings, &replayed, progress) else {
         return Ok(result);
     };
     progress("starting again with the layers in the data");
     let (tolerance, thickness_tolerance) = (scenario.tolerance, scenario.thickness_tolerance);
     // If the diagnosis with other layers fails, the first result remains valid.
     let Ok((start, mut other)) =
-        diagnose_without_empty_layer(start, recordings, options, &replayed, &mut progress)
+        diagnose_without_empty_layer(start, recordings, options, &replayed, progress)
     else {
         return Ok(result);
     };
@@ -104,7 +105,7 @@ fn other_layers(
     scenario: &Scenario,
     recordings: &[NamedRecording],
     replayed: &ReplayCount,
-    progress: &mut impl FnMut(&str),
+    progress: &mut dyn FnMut(&str),
 ) -> Option<Scenario> {
     let Scenario { tissue, tolerance, thickness_tolerance, .. } =
         scenario_from_recordings(&scenario.name, recordings, None).ok()?;
@@ -125,10 +126,10 @@ fn diagnose_without_empty_layer(
     recordings: &[NamedRecording],
     options: &Options,
     replayed: &ReplayCount,
-    progress: &mut impl FnMut(&str),
+    progress: &mut dyn FnMut(&str),
 ) -> Result<(Scenario, DiagnosisResult), DiagnoseError> {
     loop {
-        let result = diagnose_given_layers(&scenario, recordings, options, replayed, &mut *progress)?;
+        let result = diagnose_given_layers(&scenario, recordings, options, replayed, progress)?;
         let count = scenario.tissue.layers.len();
         let is_cut_short = result.diagnosis.findings.iter().any(|f| f.kind == FindingKind::SearchLimit);
         if count == 1 || is_cut_short || bears_force(&result.search.best.model.tissue, recordings) {

@@ -43,7 +43,7 @@ const BETTER_FACTOR: f64 = 2.0;
 pub(crate) fn search_from_any_start(
     prepared: PreparedRecordings,
     recordings: &[Recording],
-    progress: &mut impl FnMut(&str),
+    progress: &mut dyn FnMut(&str),
 ) -> Option<(Search, PreparedRecordings)> {
     let assumed = BaseLaw::fit(prepared)?;
     let is_out = |fit: &Fit| is_out_of_tolerance(&assumed.prepared.assumed, fit);
@@ -141,7 +141,7 @@ impl BaseLaw {
         self.fit.rms_n(&self.data)
     }
 
-    fn first_effect(&self, progress: &mut impl FnMut(&str)) -> EffectSearch {
+    fn first_effect(&self, progress: &mut dyn FnMut(&str)) -> EffectSearch {
         first_effect(&self.prepared, self.fit.clone(), self.data.clone(), progress)
     }
 
@@ -155,7 +155,7 @@ pub(crate) fn first_effect(
     prepared: &PreparedRecordings,
     base: Fit,
     data: FitData,
-    progress: &mut impl FnMut(&str),
+    progress: &mut dyn FnMut(&str),
 ) -> EffectSearch {
     let (base, data) = select_random_effects(base, data);
     let (base, data) = refit_with_random_effects(prepared, base, data);

@@ -1,7 +1,7 @@
 //! Promise: instrument faults are detected without a tissue model (delay, lag, bias, gain, drift), and
 //! nothing is detected in a faultless instrument.
 
-mod simulated_recordings;
+use crate::simulated_recordings;
 
 use simulated_recordings::{SimulatedSet, assumed_tissue, stick_slip_set};
 use stylet_diagnose::repeated_insertions::SegmentedRecording;

@@ -8,7 +8,7 @@
 //! ```
 //! What is known about a case (its effect and parameters) is asserted in addition.
 
-mod answer_file;
+use crate::answer_file;
 
 use answer_file::AnswerLines;
 use rand::SeedableRng;

@@ -2,8 +2,8 @@
 //! between recordings, and predicts held-out recordings at the repeatability floor; where the base law is
 //! true it reports no cause.
 
-mod answer_file;
-mod simulated_recordings;
+use crate::answer_file;
+use crate::simulated_recordings;
 
 use simulated_recordings::{SimulatedSet, assumed_tissue, base_law_set, base_law_set_in, stick_slip_set};
 use stylet_diagnose::Verdict;
@@ -18,7 +18,8 @@ fn diagnose(recordings: &[SegmentedRecording]) -> SetDiagnosis {
 
 fn diagnose_in(assumed: &Tissue, recordings: &[SegmentedRecording]) -> SetDiagnosis {
     let refs: Vec<&SegmentedRecording> = recordings.iter().collect();
-    diagnose_set("known", assumed, None, &refs, &ReferenceRecordings::default(), |_| {}).expect("a diagnosis")
+    diagnose_set("known", assumed, None, &refs, &ReferenceRecordings::default(), &mut |_| {})
+        .expect("a diagnosis")
 }
 
 #[test]

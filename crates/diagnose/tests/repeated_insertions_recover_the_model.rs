@@ -2,8 +2,8 @@
 //! and a surface shift between days, predicts held-out recordings at the repeatability floor, and is
 //! bitwise independent of the number of threads.
 
-mod answer_file;
-mod simulated_recordings;
+use crate::answer_file;
+use crate::simulated_recordings;
 
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use simulated_recordings::{EXPONENT, SHIFT_M, SimulatedSet, assumed_tissue, stick_slip_set};

@@ -1,7 +1,7 @@
 //! Replay in blocks of 20 ms with a compliant needle or a lagging sensor agrees with a fine integration sampled
 //! every 5 ms: through stops and starts, whose transients decay within a few samples, and through ripples.
 
-mod common;
+use crate::common;
 
 use common::one_layer;
 use std::sync::Arc;

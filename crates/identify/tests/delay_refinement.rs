@@ -1,7 +1,7 @@
 //! A force delay is identified to a fraction of the sampling interval, although friction jumps only show
 //! between which samples they lie.
 
-mod common;
+use crate::common;
 
 use common::one_layer;
 use std::sync::Arc;

@@ -1,5 +1,5 @@
 //! Promise: no input makes a reader or an inspection panic or run away, and what is read is valid.
-//! `STYLET_MUTATIONS_EACH=1000000 cargo test --release -p stylet-record --all-features --test mutated_files` sets the number per
+//! `STYLET_MUTATIONS_EACH=1000000 cargo test --release -p stylet-record --all-features --test promises mutated_files` sets the number per
 //! parser.
 
 #[allow(clippy::panic, dead_code)] // with the mutation; all parsers are fast

@@ -1,7 +1,7 @@
 //! A custom effect gives the forces of the library's effect with the same equation, and an error in a formula names its
 //! place.
 
-mod common;
+use crate::common;
 
 use common::{run, three_gels, usual_motion, worst};
 use stylet_tissue::*;

@@ -1,7 +1,7 @@
 //! Promise: the library describes every effect of docs/reference/model.md completely, an inactive effect leaves the base law
 //! bit for bit on any motion, and all effects together stay finite.
 
-mod common;
+use crate::common;
 use common::*;
 use proptest::prelude::*;
 use stylet_tissue::*;

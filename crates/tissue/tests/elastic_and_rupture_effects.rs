@@ -1,6 +1,6 @@
 //! Promise: the effects on elastic force, ruptures and the tip follow their equations in docs/reference/model.md.
 
-mod common;
+use crate::common;
 use common::*;
 use stylet_tissue::*;
 

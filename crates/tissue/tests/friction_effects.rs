@@ -1,7 +1,7 @@
 //! Promise: each friction effect follows its equation in docs/reference/model.md, and the special cases in which one
 //! friction becomes another hold.
 
-mod common;
+use crate::common;
 use common::*;
 use stylet_tissue::*;
 

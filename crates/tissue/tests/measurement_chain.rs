@@ -1,7 +1,7 @@
 //! Promise: the recorded force is the tissue's force through tool and sensor in the order of
 //! docs/reference/model.md (Measurement chain), at any sampling, without allocation per sample.
 
-mod common;
+use crate::common;
 use common::*;
 use proptest::prelude::*;
 use stylet_tissue::*;

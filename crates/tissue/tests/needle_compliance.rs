@@ -1,7 +1,7 @@
 //! Promise: a needle that gives is `z_tip = z - f/k_s` to the last digit at every sample, springs in
 //! series in the simple case, a tip that jumps at a rupture and sticks at a reversal, always finite.
 
-mod common;
+use crate::common;
 use common::*;
 use proptest::prelude::*;
 use stylet_tissue::*;

@@ -1,7 +1,7 @@
 //! Promise: the per-layer effects follow their equations, inactive ones leave the
 //! base law bit for bit, and the special cases in which they become older effects hold.
 
-mod common;
+use crate::common;
 use common::*;
 use stylet_tissue::*;
 

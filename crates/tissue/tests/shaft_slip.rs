@@ -1,7 +1,7 @@
 //! Promise: `shaft_slip` is presliding far below its holding force, steady sliding by a power of the speed, and power-law
 //! creep in a hold; `delayed_puncture`, `layer_coupling` and `release_depth` follow their equations.
 
-mod common;
+use crate::common;
 use common::*;
 use proptest::prelude::*;
 use stylet_tissue::*;

@@ -103,7 +103,7 @@ fn no_other_number_of_layers_is_tried_beyond_the_limit_of_replays() {
     let replayed = ReplayCount::default();
     let count = || replayed.load(std::sync::atomic::Ordering::Relaxed);
     let brief = Options { brief: true, ..Options::default() };
-    diagnose_given_layers(&scenario, &recordings, &brief, &replayed, |_| {}).expect("a diagnosis");
+    diagnose_given_layers(&scenario, &recordings, &brief, &replayed, &mut |_| {}).expect("a diagnosis");
     let first = count();
     assert!(first > 0 && simple_explanation(&scenario, &recordings, &replayed, &mut |_| {}).is_some());
     assert!(count() > first);

@@ -40,7 +40,7 @@ pub(crate) fn propose_formulas(
     model: &Fit,
     data: &FitData,
     held_out_n: f64,
-    mut progress: impl FnMut(&str),
+    progress: &mut dyn FnMut(&str),
 ) -> Option<(ProposedFormulas, Vec<AnyEffect>)> {
     if data.recording_count() < 2 {
         return None;

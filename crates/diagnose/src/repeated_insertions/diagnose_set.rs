@@ -79,7 +79,7 @@ pub fn diagnose_set(
     scenario: Option<&Scenario>,
     recordings: &[&SegmentedRecording],
     references: &ReferenceRecordings,
-    mut progress: impl FnMut(&str),
+    progress: &mut dyn FnMut(&str),
 ) -> Option<SetDiagnosis> {
     let mut instrument = InstrumentReport::assess(references, recordings, assumed.surface_m);
     // What the scenario assumes is in the model; a correction would apply it twice.
@@ -89,7 +89,7 @@ pub fn diagnose_set(
     let recordings: Vec<&SegmentedRecording> = corrected.iter().collect();
     let recordings = recordings.as_slice();
     let mut rng = ChaCha8Rng::seed_from_u64(START_VALUE_SEED);
-    let candidates = select_model((assumed, scenario), recordings, &artefacts, &mut rng, &mut progress)?;
+    let candidates = select_model((assumed, scenario), recordings, &artefacts, &mut rng, progress)?;
     progress("leave-one-out predictions");
     let held_out = leave_one_out(&candidates.best.set_fit, recordings);
     let base_held_out = base_predictions(&candidates, &held_out, recordings);

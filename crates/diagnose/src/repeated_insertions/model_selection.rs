@@ -49,7 +49,7 @@ pub fn select_model(
     recordings: &[&SegmentedRecording],
     artefacts: &SensorArtefacts,
     rng: &mut ChaCha8Rng,
-    progress: &mut impl FnMut(&str),
+    progress: &mut dyn FnMut(&str),
 ) -> Option<CandidateModels> {
     progress("fitting the base law");
     let prepared = PreparedRecordings::new(

@@ -1,0 +1,35 @@
+//! Tests of the commands, one file per promise; one program, because linking takes longer than testing.
+
+mod bad_input;
+mod check;
+mod compare;
+mod constants_are_documented;
+mod custom_effects;
+mod detection_over_noise_seeds;
+mod diagnosis_accuracy;
+mod disk_faults;
+mod effect_ids_only_in_tissue;
+mod enhance_with_model;
+mod exit_codes;
+mod foreign_files;
+mod identify;
+mod listen;
+mod measured;
+mod measured_repeats;
+mod memory_limit;
+mod mutated_inputs;
+mod no_import_cycles;
+mod reference_files;
+mod repeats;
+mod report_in_browser;
+mod reproduced_claims;
+mod results_are_replaced_atomically;
+mod run_is_deterministic;
+mod studio;
+mod support;
+mod sweep_bad_input;
+mod sweep_gate;
+mod sweep_is_deterministic;
+mod transfer;
+mod unusable_recordings;
+mod virtual_sensor_detects_the_same_ruptures;
