@@ -118,7 +118,7 @@ impl EffectSearch {
             |s: &Search| bic_penalty(s.best.model.effect_parameter_count(), s.data.compared_block_count());
         let needed = penalty(&other.search) - penalty(&self.search);
         let gain = likelihood_gain(&self.search.best, &other.search.best, &other.search.data);
-        if gain.exceeds(needed) { other } else { self }
+        if gain > needed { other } else { self }
     }
 }
 
@@ -174,7 +174,7 @@ impl Baseline {
             let count = |f: &Fit| f.model.effect_parameter_count() as f64;
             let blocks = other.2.compared_block_count();
             let penalty = (count(&other.1) - count(&best.1)) * bic_penalty(1, blocks);
-            likelihood_gain(&best.1, &other.1, &other.2).value() - penalty
+            likelihood_gain(&best.1, &other.1, &other.2) - penalty
         };
         let rounds = match effort {
             BaselineEffort::Quick => 1,
@@ -233,8 +233,12 @@ impl Baseline {
         let any = !search.best.model.effects.is_empty() || search.best.model.zero_step_count() > 0;
         let needed =
             bic_penalty(search.best.model.effect_parameter_count(), search.data.compared_block_count());
-        (any && likelihood_gain(base, &search.best, &search.data).exceeds(needed + MIN_GAIN_NATS))
-            .then_some(Self { prepared, fit: search.best, data: search.data, stages })
+        (any && likelihood_gain(base, &search.best, &search.data) > needed + MIN_GAIN_NATS).then_some(Self {
+            prepared,
+            fit: search.best,
+            data: search.data,
+            stages,
+        })
     }
 }
 
@@ -276,7 +280,7 @@ impl Search {
                 .into_par_iter()
                 .map(|(k, f)| {
                     let needed = bic_penalty(count(&self.best) - count(&f), blocks) + MIN_GAIN_NATS;
-                    (k, likelihood_gain(&f, &self.best, &self.data).value(), needed, f)
+                    (k, likelihood_gain(&f, &self.best, &self.data), needed, f)
                 })
                 .collect();
             let weakest = gains.iter().min_by(|a, b| (a.1 - a.2).total_cmp(&(b.1 - b.2)));

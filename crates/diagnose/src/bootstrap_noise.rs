@@ -28,7 +28,6 @@ fn under_noise(columns: &[RecordingColumn], matrix: &SymmetricMatrix, data: &Fit
 }
 
 /// Information matrices under bootstrap estimates of the noise; `matrix` is the one under the noise of `data`.
-#[must_use]
 pub fn bootstrap_noise(
     tangent: &Linearization,
     data: &FitData,

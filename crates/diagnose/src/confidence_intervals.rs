@@ -58,7 +58,6 @@ enum RandomEffect {
 
 impl<'a> Covariance<'a> {
     /// Covariance including the uncertainty of the estimated noise.
-    #[must_use]
     pub fn new(fit: &'a Fit, data: &FitData, rng: &mut impl Rng) -> Self {
         let mut covariance = Self::with_known_noise(fit, data);
         covariance.bootstrap = bootstrap_noise(&covariance.tangent, data, &covariance.matrix, rng)
@@ -146,7 +145,6 @@ impl<'a> Covariance<'a> {
 
     /// Evidence (nats) against zero strength of an effect: half the squared normal deviate with the same tail probability as Student's t,
     /// the largest over its strengths. `None` if no strength can be zero in the scale of the fit.
-    #[must_use]
     pub fn nats_against_zero(&self, effect: usize) -> Option<f64> {
         let choice = &self.fit.model.effects[effect];
         let strengths = choice.info.parameters.iter().zip(&choice.values).enumerate();
@@ -187,7 +185,6 @@ impl<'a> Covariance<'a> {
 
     /// Value and half width of the 95 % interval of a shared parameter, in the scale of the fit; `None` when it is not
     /// free.
-    #[must_use]
     pub fn shared_parameter(&self, role: ParameterRole) -> Option<(f64, f64)> {
         let i = self.index_of(role)?;
         let mut unit = vec![0.0; self.tangent.normal_matrix.size];
@@ -200,14 +197,12 @@ impl<'a> Covariance<'a> {
 
     /// Upper end of the 95 % interval of the prior (scale of the fit) for a puncture force that the data do not bound from above; `None`
     /// otherwise.
-    #[must_use]
     pub fn prior_upper_end(&self, role: ParameterRole) -> Option<f64> {
         let n = self.tangent.shared.iter().find(|n| n.role == role)?;
         is_open_above(self.fit, n).then(|| n.prior_mean + n.prior_sd * normal::quantile(UPPER_PROBABILITY))
     }
 
     /// Largest elastic force (N) of a layer in any recording, reduced by the 95 % range of the scatter of its puncture force.
-    #[must_use]
     pub fn reached_force_n(&self, layer: usize) -> f64 {
         let events = self.fit.residuals.ruptures.iter().filter_map(|e| e.get(layer));
         let reached_n = events.map(|e| e.elastic_n).fold(0.0, f64::max);
@@ -216,7 +211,6 @@ impl<'a> Covariance<'a> {
     }
 
     /// Paths of the parameters of an effect that are at a bound of the search.
-    #[must_use]
     pub fn effect_bounds(&self, effect: usize) -> Vec<String> {
         let choice = &self.fit.model.effects[effect];
         let parameters = choice.info.parameters.iter().zip(&choice.values).enumerate();
@@ -228,17 +222,15 @@ impl<'a> Covariance<'a> {
     }
 
     /// Whether a shared parameter is at a bound.
-    #[must_use]
     pub fn at_bound(&self, role: ParameterRole) -> bool {
-        self.tangent.shared.iter().find(|n| n.role == role).is_some_and(|n| {
-            let x = self.fit.model.get(role, 0);
-            let near = 1e-6 * (n.high - n.low).min(1.0);
-            x <= n.low + near || x >= n.high - near
-        })
+        self.tangent
+            .shared
+            .iter()
+            .find(|n| n.role == role)
+            .is_some_and(|n| n.is_at_bound(self.fit.model.get(role, 0), 1e-6))
     }
 
     /// Estimate of an effect parameter with its 95 % interval.
-    #[must_use]
     pub fn effect_parameter(&self, effect: usize, parameter: usize) -> Estimate {
         let choice = &self.fit.model.effects[effect];
         let p = &choice.info.parameters[parameter];
@@ -288,7 +280,6 @@ fn is_open_above(fit: &Fit, n: &Parameter) -> bool {
 
 /// Sets puncture forces that the data do not bound from above to their prior mean and refits, so that they do not constrain stiffness and
 /// relaxation; the fit is unchanged if that increases the objective too much.
-#[must_use]
 pub fn release_unreached_punctures(fit: Fit, data: &FitData) -> Fit {
     let below = |n: &Parameter| n.prior_mean > fit.model.get(n.role, 0) && is_open_above(&fit, n);
     let open: Vec<Parameter> = fit.model.shared_parameters().into_iter().filter(below).collect();

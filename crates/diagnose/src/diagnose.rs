@@ -227,12 +227,8 @@ pub(crate) fn diagnose_given_layers(
     }
     let mut diagnosis = Diagnosis {
         verdict,
-        agrees: false,
-        grade: None,
-        findings: Vec::new(),
         check,
         visible_effects,
-        formulas: None,
         partial,
         advice: advice(&causes, &not_identifiable, common_motion_period_s(&search.data)),
         base_parameters: assessment.base_parameters,
@@ -252,8 +248,8 @@ pub(crate) fn diagnose_given_layers(
         search_steps: search.stages.iter().map(search_step).collect(),
         noise: NoiseReport { sd_n: noise_n, ar: autoregression(&search), from_air: false },
         random_effect_sd: random_effect_sd(&search),
-        training: None,
         causes,
+        ..Diagnosis::default()
     };
     let context = Context {
         one_motion,
@@ -376,7 +372,7 @@ fn air_noise_n(scenario: &Scenario, data: &FitData) -> Option<f64> {
             let sum: &mut (f64, f64) = &mut sums[*k as usize];
             *sum = (sum.0 + e * e, sum.1 + 1.0);
         }
-        let in_air = |k: usize| b.motion.at(0.5 * (b.start_s[k] + b.end_s[k])).0 < end_m;
+        let in_air = |k: usize| b.motion.at(b.mid_s(k)).0 < end_m;
         squares.extend(
             (0..b.len()).filter(|k| b.used[*k] && in_air(*k)).map(|k| sums[k].0 / f64::max(sums[k].1, 1.0)),
         );

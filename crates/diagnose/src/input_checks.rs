@@ -188,15 +188,8 @@ pub(crate) fn force_outlier_notes(ratios: &[Option<f64>]) -> Vec<Option<QualityN
             "it is not like the others: its force is {ratio:.2} times what the scenario expects of its motion, that of the others {typical:.2} \
              times; check its tissue, needle and units, or leave it out"
         );
-        let numbers =
-            [("force_ratio", ratio), ("others_force_ratio", typical)].map(|(name, x)| (name.to_owned(), x));
-        Some(QualityNote {
-            kind: QualityKind::OutlierRecording,
-            message,
-            numbers: numbers.into_iter().collect(),
-            lines: Vec::new(),
-            blocking: false,
-        })
+        let numbers = [("force_ratio", ratio), ("others_force_ratio", typical)];
+        Some(QualityNote::new(QualityKind::OutlierRecording, message, numbers))
     };
     (0..ratios.len()).map(note).collect()
 }
@@ -312,9 +305,8 @@ pub(crate) fn non_finite_note(r: &Recording) -> Option<QualityNote> {
         bad.len(),
         first + 1
     );
-    let numbers =
-        [("count".to_owned(), bad.len() as f64), ("first".to_owned(), first as f64)].into_iter().collect();
-    Some(QualityNote { kind: QualityKind::Gaps, message, numbers, lines: Vec::new(), blocking: false })
+    let numbers = [("count", bad.len() as f64), ("first", first as f64)];
+    Some(QualityNote::new(QualityKind::Gaps, message, numbers))
 }
 
 #[cfg(test)]

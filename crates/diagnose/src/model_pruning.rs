@@ -3,7 +3,6 @@
 use crate::base_law_fit::with_updated_times;
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use crate::selection_state::Search;
-use stylet_identify::evidence_nats::Nats;
 use stylet_identify::fit::{Effort, Fit, Linearization, fit};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{EffectTerm, ParameterRole};
@@ -35,10 +34,11 @@ impl Search {
             if let Some(f) = full
                 && !effect_at_bound(&f, k)
                 && strengths_are_determined(&f, k, &self.data)
-                && likelihood_gain(&self.best, &f, &self.data).exceeds(bic_penalty(
-                    f.model.effect_parameter_count() - self.best.model.effect_parameter_count(),
-                    self.data.compared_block_count(),
-                ))
+                && likelihood_gain(&self.best, &f, &self.data)
+                    > bic_penalty(
+                        f.model.effect_parameter_count() - self.best.model.effect_parameter_count(),
+                        self.data.compared_block_count(),
+                    )
             {
                 self.accept(f);
             }
@@ -67,7 +67,7 @@ impl Search {
             };
             let worst = reduced.into_iter().map(|(_, f)| (surplus(&f), f)).min_by(|a, b| a.0.total_cmp(&b.0));
             match worst {
-                Some((surplus, f)) if surplus < Nats::new(0.0) => self.accept(f),
+                Some((surplus, f)) if surplus < 0.0 => self.accept(f),
                 _ => return,
             }
         }
@@ -75,7 +75,6 @@ impl Search {
 }
 
 /// Gain (nats) required of the additional parameters of `larger`.
-#[must_use]
 pub fn required_gain_nats(smaller: &Fit, larger: &Fit, data: &FitData) -> f64 {
     let more = larger.model.effect_parameter_count().saturating_sub(smaller.model.effect_parameter_count());
     bic_penalty(more, data.compared_block_count()) + MIN_GAIN_NATS
@@ -96,7 +95,6 @@ pub(crate) fn strengths_are_determined(f: &Fit, which: usize, data: &FitData) ->
 }
 
 /// Whether a parameter of an effect is at a bound.
-#[must_use]
 pub fn effect_at_bound(f: &Fit, which: usize) -> bool {
     f.model.shared_parameters().iter().any(|n| match n.role {
         ParameterRole::Effect { effect, .. } if effect == which => {

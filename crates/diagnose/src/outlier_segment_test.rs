@@ -18,10 +18,9 @@ const MIN_NOISE_RATIO: f64 = 3.0;
 
 /// p-value of the most extreme segment in residuals `e` (N), `None` without one. A segment has consecutive window means of one sign above
 /// both ratios. The p-value is that of a normal mean of this size, times the number of windows.
-#[must_use]
 pub fn outlier_segment_p_value(data: &FitData, e: &[Vec<f64>]) -> Option<f64> {
     let of = |(b, e): (&BlockAverages, &Vec<f64>)| -> Vec<f64> {
-        let per = ((WINDOW_S / (b.sample_step_s * b.samples_per_block as f64)).round() as usize).max(1);
+        let per = ((WINDOW_S / b.block_s()).round() as usize).max(1);
         let mean = |from: usize| {
             let (mut sum, mut n) = (0.0, 0_usize);
             for k in (from..(from + per).min(b.len())).filter(|k| b.used[*k] && e[*k].is_finite()) {

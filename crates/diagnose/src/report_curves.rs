@@ -53,7 +53,7 @@ pub fn recording_curves(examined: &DiagnosisResult) -> Vec<RecordingCurves> {
         .iter()
         .enumerate()
         .map(|(r, b)| {
-            let t: Vec<f64> = (0..b.len()).map(|k| 0.5 * (b.start_s[k] + b.end_s[k])).collect();
+            let t: Vec<f64> = (0..b.len()).map(|k| b.mid_s(k)).collect();
             let (position_m, velocity_mps) = t.iter().map(|t| b.motion.at(*t)).unzip();
             let ruptures = &best.model.rupture_times_s[r];
             // In retraction the tip comes back through the layers that it has passed.

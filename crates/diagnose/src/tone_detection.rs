@@ -27,20 +27,18 @@ pub fn residual_spectrum(fit: &Fit, data: &FitData) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// Block residuals (N) of a fit without tones at the frequencies `lines` (Hz), whose amplitude and phase are fitted per recording.
-#[must_use]
-pub fn remove_tones(fit: &Fit, data: &FitData, lines: &[f64]) -> Vec<Vec<f64>> {
+pub(crate) fn remove_tones(fit: &Fit, data: &FitData, lines: &[f64]) -> Vec<Vec<f64>> {
     let mut e = fit.residuals.residual_n.clone();
     for (b, e) in data.recordings.iter().zip(&mut e) {
         for hz in lines {
-            subtract_sinusoid(e, |k| 0.5 * (b.start_s[k] + b.end_s[k]), |k| b.used[k], *hz);
+            subtract_sinusoid(e, |k| b.mid_s(k), |k| b.used[k], *hz);
         }
     }
     e
 }
 
 /// The data with the noise estimated from the residual without these tones (Hz), which an autoregression would absorb as coloured noise.
-#[must_use]
-pub fn with_noise_without_tones(fit: &Fit, data: &FitData, lines: &[f64]) -> FitData {
+pub(crate) fn with_noise_without_tones(fit: &Fit, data: &FitData, lines: &[f64]) -> FitData {
     data.with_estimated_noise(&remove_tones(fit, data, lines), NoiseSource::Detrended)
 }
 

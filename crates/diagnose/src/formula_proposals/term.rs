@@ -125,7 +125,7 @@ impl Sample {
         let mut before: Option<Self> = None;
         (0..b.len())
             .map(|k| {
-                let time_s = 0.5 * (b.start_s[k] + b.end_s[k]);
+                let time_s = b.mid_s(k);
                 let (z_m, v_mps) = b.motion.at(time_s);
                 let (mut a_mps2, mut moved_m) = (0.0, 0.0);
                 if let Some(before) = before {

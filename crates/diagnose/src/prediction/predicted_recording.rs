@@ -118,7 +118,7 @@ pub fn predict_one(
     let mut predicted_n = less(&law.residual_n);
     prepared.add_mean_residual(training, r, &deviation, &target.mean_residual, &mut predicted_n);
     let within_n2 = b.within_block_sd_n().powi(2);
-    let blocks = b.used.iter().filter(|u| **u).count() as f64;
+    let blocks = b.compared_block_count() as f64;
     let square = |f: &dyn Fn(usize) -> f64| {
         let errors = (0..b.len()).filter(|k| b.used[*k]).map(|k| (b.force_n[k] - f(k)).powi(2));
         errors.sum::<f64>() + within_n2 * blocks

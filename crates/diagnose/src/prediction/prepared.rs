@@ -72,15 +72,10 @@ impl Prepared {
         free_run_force(&self.model, &self.data, r)
     }
 
-    /// Length of a block in s.
-    pub fn block_s(&self, b: &BlockAverages) -> f64 {
-        (b.samples_per_block as f64 * b.sample_step_s).max(1e-9)
-    }
-
     /// Weight of a squared error of a block of recording `r`, in 1/N²; a block counts for less than one sample because the discrepancy is
     /// correlated.
     pub fn weight(&self, training: Option<&TrainingSummary>, r: usize) -> f64 {
-        let block_s = self.block_s(&self.data.recordings[r]);
+        let block_s = self.data.recordings[r].block_s();
         let correlation_s = training.map_or(0.0, |t| t.correlation_s);
         block_s / (block_s + 2.0 * correlation_s) / self.misfit_n(training).powi(2)
     }

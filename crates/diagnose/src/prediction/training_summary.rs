@@ -111,10 +111,10 @@ pub(super) fn summarise(prepared: &Prepared) -> Option<TrainingSummary> {
     out.discrepancy_sd_n = stored(discrepancy.iter().map(|d| d.map(|d| scale * d)).collect());
     let (mut square, mut lagged, mut blocks) = (0.0, 0.0, 0.0);
     for (e, b) in left.iter().zip(data.recordings.iter()) {
-        let lag = (CORRELATION_LAG_S / prepared.block_s(b)).round().max(1.0) as usize;
+        let lag = (CORRELATION_LAG_S / b.block_s()).round().max(1.0) as usize;
         square += lagged_sum(e, &b.used, 0);
         lagged += lagged_sum(e, &b.used, lag);
-        blocks += b.used.iter().filter(|u| **u).count() as f64;
+        blocks += b.compared_block_count() as f64;
     }
     out.residual_rms_n = (square / f64::max(blocks, 1.0)).sqrt().max(uncertainty.block_n);
     let correlation = (lagged / square.max(1e-300)).clamp(CORRELATION_BOUNDS.0, CORRELATION_BOUNDS.1);

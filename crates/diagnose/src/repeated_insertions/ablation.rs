@@ -42,8 +42,7 @@ pub struct ModelTerm {
 
 impl ModelTerm {
     /// Whether this is an effect that improves prediction without significance: it is kept in the model but not reported as a cause.
-    #[must_use]
-    pub fn is_uncertain(&self) -> bool {
+    pub(crate) fn is_uncertain(&self) -> bool {
         self.kept && !self.significant && self.name == self.effect
     }
 }

@@ -27,8 +27,7 @@ pub struct PredictionScore {
 }
 
 /// Scores a predicted force.
-#[must_use]
-pub fn score_prediction(run: &SegmentedRecording, p: &PredictedForce) -> PredictionScore {
+pub(crate) fn score_prediction(run: &SegmentedRecording, p: &PredictedForce) -> PredictionScore {
     let r = &run.recording;
     let mut out = PredictionScore::default();
     let first = run.ruptures_s.iter().copied().fold(NO_RUPTURE, f64::min);
@@ -59,8 +58,7 @@ pub fn score_prediction(run: &SegmentedRecording, p: &PredictedForce) -> Predict
 }
 
 /// Recordings that are not held out.
-#[must_use]
-pub fn training_recordings<'a>(
+pub(crate) fn training_recordings<'a>(
     recordings: &[&'a SegmentedRecording],
     out: &[usize],
 ) -> Vec<&'a SegmentedRecording> {
@@ -68,8 +66,7 @@ pub fn training_recordings<'a>(
 }
 
 /// Refits without the recordings `out`; `rounds` are the numbers of iterations between noise updates.
-#[must_use]
-pub fn refit_without(all: &SetFit, out: &[usize], rounds: &[usize]) -> Option<SetFit> {
+pub(crate) fn refit_without(all: &SetFit, out: &[usize], rounds: &[usize]) -> Option<SetFit> {
     let kept: Vec<usize> = (0..all.drop_times_s.len()).filter(|r| !out.contains(r)).collect();
     let drops: Vec<Vec<f64>> = kept.iter().map(|r| all.drop_times_s[*r].clone()).collect();
     let (fit, data) =
@@ -78,8 +75,7 @@ pub fn refit_without(all: &SetFit, out: &[usize], rounds: &[usize]) -> Option<Se
 }
 
 /// Population of a refit without the recordings `out`.
-#[must_use]
-pub fn population_without(
+pub(crate) fn population_without(
     all: &SetFit,
     recordings: &[&SegmentedRecording],
     out: &[usize],

@@ -234,18 +234,8 @@ fn diagnosis(
     let scatter = &model.scatter;
     let mut diagnosis = Diagnosis {
         verdict,
-        agrees: false,
-        grade: None,
-        findings: Vec::new(),
-        check: Vec::new(),
-        by_recording: Vec::new(),
-        visible_effects: Vec::new(),
-        partial: None,
-        formulas: None,
         causes,
         base_parameters: base_parameters(&estimates, assumed),
-        parameters: Vec::new(),
-        covariance: Vec::new(),
         not_identifiable: unidentified_effects(best, recordings),
         gain: Gain {
             held_out: true,
@@ -277,7 +267,7 @@ fn diagnosis(
             friction: scatter.ln_friction,
         },
         advice: advice(best, &estimates),
-        training: None,
+        ..Diagnosis::default()
     };
     // The repeatability floor already contains the scatter between recordings.
     claims::apply(&mut diagnosis, &Context::default());
@@ -344,7 +334,6 @@ fn cause(
     let share = (square(without) - square(&best.errors_n)) / explained;
     Cause {
         effect: id.to_owned(),
-        equivalent: Vec::new(),
         confidence,
         parameters,
         gain_nats: (base.set_fit.fit.nats() - best.set_fit.fit.nats()).max(0.0),

@@ -142,7 +142,7 @@ fn identified_effects(model: &Model, speed_mps: f64, like: Option<&ShaftSlip>) -
                 let (push_n, pull_n) = (s.plateau_n(speed_mps), -s.plateau_n(-speed_mps));
                 s = ShaftSlip { rate: -1.0 / s.exponent, push_n, pull_n, ..s };
             }
-            EffectTerm::new(term.info, &AnyEffect::from(s).parameters())
+            EffectTerm::of(&s.into())
         }
         _ => term.clone(),
     };

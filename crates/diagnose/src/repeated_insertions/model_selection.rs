@@ -43,8 +43,7 @@ pub struct CandidateModels {
 
 /// Fits and compares the candidate models: from the numbers of a scenario, if there is one, as a diagnosis of single recordings does, and from
 /// those in the data. `None` when the base law cannot be fitted.
-#[must_use]
-pub fn select_model(
+pub(crate) fn select_model(
     (assumed, scenario): (&Tissue, Option<&Scenario>),
     recordings: &[&SegmentedRecording],
     artefacts: &SensorArtefacts,

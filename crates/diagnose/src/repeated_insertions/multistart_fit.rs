@@ -61,8 +61,7 @@ impl SetFit {
     }
 
     /// Fits another model to the same recordings, from its own values.
-    #[must_use]
-    pub fn refit_with(&self, model: &Model) -> Option<Self> {
+    pub(crate) fn refit_with(&self, model: &Model) -> Option<Self> {
         let (fit, data) = fit_with_noise_updates(model, self.data.clone(), &self.drop_times_s, &[6])?;
         Some(Self { fit, data, drop_times_s: self.drop_times_s.clone(), starts: self.starts })
     }
@@ -121,8 +120,7 @@ fn start_values(k: usize, rng: &mut ChaCha8Rng) -> StartValues {
 }
 
 /// Fits in rounds; before each, noise, rupture times and scatter are updated from the previous fit.
-#[must_use]
-pub fn fit_with_noise_updates(
+pub(crate) fn fit_with_noise_updates(
     model: &Model,
     data: FitData,
     drops: &[Vec<f64>],
@@ -188,7 +186,7 @@ fn move_day_trend_to_rate(model: &mut Model, data: &FitData) {
         if let Some(AnyEffect::ShaftSlip(mut s)) = term.effect() {
             s.scale_friction(libm::exp(level));
             s.rate += slope;
-            model.effects[e] = EffectTerm::new(term.info, &AnyEffect::from(s).parameters());
+            model.effects[e] = EffectTerm::of(&s.into());
         }
     }
 }

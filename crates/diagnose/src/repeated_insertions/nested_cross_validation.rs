@@ -26,7 +26,6 @@ pub struct NestedCrossValidation {
 
 /// Repeats the selection without each fold, with the start values of the fits to all recordings. `None` when a fold leaves too few
 /// recordings.
-#[must_use]
 pub fn nested_cross_validation(
     candidates: &CandidateModels,
     recordings: &[&SegmentedRecording],

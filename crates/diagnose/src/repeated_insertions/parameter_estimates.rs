@@ -30,7 +30,6 @@ pub struct ParameterEstimate {
 
 impl ParameterEstimate {
     /// Value and interval.
-    #[must_use]
     pub fn estimate(&self) -> Estimate {
         Estimate { value: self.value, low: self.low, high: self.high }
     }
@@ -38,10 +37,8 @@ impl ParameterEstimate {
 
 /// Whether a parameter is at its bound.
 pub(super) fn is_at_bound(model: &Model, role: ParameterRole) -> bool {
-    model.shared_parameters().iter().find(|n| n.role == role).is_some_and(|n| {
-        let (x, near) = (model.get(role, 0), BOUND_TOLERANCE * (n.high - n.low).min(1.0));
-        x <= n.low + near || x >= n.high - near
-    })
+    let parameter = model.shared_parameters().into_iter().find(|n| n.role == role);
+    parameter.is_some_and(|n| n.is_at_bound(model.get(role, 0), BOUND_TOLERANCE))
 }
 
 /// Owner and path of every parameter, its value, and whether it is at its bound.
@@ -93,7 +90,6 @@ fn parameter_values(model: &Model) -> Vec<(String, String, f64, bool)> {
 }
 
 /// Estimates with 95 % jackknife intervals over recordings (Quenouille, Tukey). They include model error that differs between recordings.
-#[must_use]
 pub fn jackknife_estimates(fitted: &SetFit, out: &[HeldOutPrediction]) -> Vec<ParameterEstimate> {
     let others: Vec<_> =
         out.iter().filter_map(|o| o.population.as_ref()).map(|p| parameter_values(&p.model)).collect();
@@ -113,7 +109,6 @@ pub fn jackknife_estimates(fitted: &SetFit, out: &[HeldOutPrediction]) -> Vec<Pa
 }
 
 /// Base parameters among the estimates, with their assumed values.
-#[must_use]
 pub fn base_parameters(estimates: &[ParameterEstimate], assumed_tissue: &Tissue) -> Vec<BaseParameter> {
     estimates
         .iter()

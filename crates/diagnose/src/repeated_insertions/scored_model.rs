@@ -61,13 +61,11 @@ impl ScoredModel {
 
 /// The fit on coarser blocks; unchanged if its blocks are already coarse.
 pub(super) fn with_coarse_blocks(fitted: &SetFit) -> SetFit {
-    let long = |b: &BlockAverages| b.samples_per_block as f64 * b.sample_step_s > 1.5 * SET_BLOCK_S;
+    let long = |b: &BlockAverages| b.block_s() > 1.5 * SET_BLOCK_S;
     if fitted.data.recordings.iter().all(long) {
         return fitted.clone();
     }
-    let blocks: Vec<BlockAverages> =
-        fitted.data.recordings.par_iter().map(|b| b.coarsened(COARSENING_FACTOR)).collect();
-    SetFit { data: fitted.data.with_recordings(blocks), ..fitted.clone() }
+    SetFit { data: fitted.data.coarsened(COARSENING_FACTOR), ..fitted.clone() }
 }
 
 /// Indices of the recordings of each cross-validation fold.
@@ -140,8 +138,7 @@ pub(super) fn rms_errors_n(scores: &[Option<PredictionScore>]) -> Vec<f64> {
 }
 
 /// The `shaft_slip` effect.
-#[must_use]
-pub fn shaft_slip_info() -> &'static EffectInfo {
+pub(crate) fn shaft_slip_info() -> &'static EffectInfo {
     ShaftSlip::default().info()
 }
 

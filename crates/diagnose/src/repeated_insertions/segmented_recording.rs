@@ -107,15 +107,13 @@ pub fn group_by_speed_and_stroke(recordings: &[&SegmentedRecording]) -> Vec<Vec<
 }
 
 /// Whether all recordings have the same speed.
-#[must_use]
-pub fn have_one_speed(recordings: &[&SegmentedRecording]) -> bool {
+pub(crate) fn have_one_speed(recordings: &[&SegmentedRecording]) -> bool {
     let slowest = recordings.iter().map(|r| r.speed_mps).fold(f64::INFINITY, f64::min);
     recordings.iter().all(|r| r.speed_mps < slowest * (1.0 + SPEED_TOLERANCE))
 }
 
 /// Whether the recordings have several speeds or strokes.
-#[must_use]
-pub fn have_several_speeds(recordings: &[&SegmentedRecording]) -> bool {
+pub(crate) fn have_several_speeds(recordings: &[&SegmentedRecording]) -> bool {
     group_by_speed_and_stroke(recordings).len() > 1
 }
 

@@ -29,8 +29,7 @@ struct BlockWhitening {
 
 impl Noise {
     /// Computes the whitening plan of a recording.
-    #[must_use]
-    pub fn whitening_plan(&self, b: &BlockAverages) -> WhiteningPlan {
+    pub(crate) fn whitening_plan(&self, b: &BlockAverages) -> WhiteningPlan {
         let mut run = 0;
         let lasting = self.long_memory;
         let rows = (0..b.len()).map(|k| {

@@ -238,7 +238,7 @@ fn fit_specimen(assumed: &Tissue, run: &SegmentedRecording) -> Option<SpecimenFi
         let b = all.recordings.first()?;
         let (mut before, mut after) = (Vec::new(), Vec::new());
         for (k, e) in left.residual_n.first()?.iter().enumerate().filter(|(k, _)| b.used[*k]) {
-            if 0.5 * (b.start_s[k] + b.end_s[k]) > end { after.push(*e) } else { before.push(*e) }
+            if b.mid_s(k) > end { after.push(*e) } else { before.push(*e) }
         }
         Some((rms(&before), rms(&after)))
     };
@@ -246,7 +246,7 @@ fn fit_specimen(assumed: &Tissue, run: &SegmentedRecording) -> Option<SpecimenFi
     for (_, effects) in candidate_sequence() {
         let starts = if effects.is_empty() { vec![model.clone()] } else { Vec::new() };
         let with = |effect: &AnyEffect| {
-            let term = EffectTerm::new(effect.info(), &effect.parameters());
+            let term = EffectTerm::of(effect);
             // The candidate replaces a term of the same effect.
             let one = model.effects.iter().position(|c| c.info.id == term.info.id);
             one.map_or_else(|| model.clone(), |k| model.without_effect(k)).with_effect(term)

@@ -59,8 +59,7 @@ pub struct DetectedFault {
 
 impl DetectedFault {
     /// Whether the recordings are corrected for it; block means remove tones, and drive friction stays.
-    #[must_use]
-    pub fn is_corrected(&self) -> bool {
+    pub(crate) fn is_corrected(&self) -> bool {
         let stays =
             |e: &AnyEffect| matches!(e, AnyEffect::PeriodicInterference(_) | AnyEffect::DriveFriction(_));
         self.effect_model.as_ref().is_some_and(|e| !stays(e))
@@ -71,11 +70,8 @@ impl DetectedFault {
     pub fn cause(&self) -> Cause {
         Cause {
             effect: self.effect.clone(),
-            equivalent: Vec::new(),
             confidence: DETECTION_CONFIDENCE,
             parameters: self.parameters.clone(),
-            gain_nats: 0.0,
-            share: 0.0,
             ..Cause::default()
         }
     }
