@@ -82,9 +82,9 @@ pub fn required_gain_nats(smaller: &Fit, larger: &Fit, data: &FitData) -> f64 {
 
 /// Whether each strength of an effect is significant by itself; two terms that replace one could share its strength arbitrarily.
 pub(crate) fn strengths_are_determined(f: &Fit, which: usize, data: &FitData) -> bool {
-    let tangent = Linearization::new(&f.model, data, &f.residuals);
-    let variances = tangent.factor().inverse_diagonal();
-    tangent.shared.iter().zip(variances).all(|(n, variance)| match n.role {
+    let linearization = Linearization::new(&f.model, data, &f.residuals);
+    let variances = linearization.factor().inverse_diagonal();
+    linearization.shared.iter().zip(variances).all(|(n, variance)| match n.role {
         ParameterRole::Effect { effect, parameter } if effect == which => {
             let p = &f.model.effects[which].info.parameters[parameter];
             let off = f.model.effects[which].values[parameter] - p.inactive;

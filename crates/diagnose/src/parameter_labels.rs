@@ -141,10 +141,10 @@ fn profile_label(covariance: &Covariance, data: &FitData, role: ParameterRole) -
     unit[i] = 1.0;
     let column = covariance.factor.solve(&unit);
     let follow: Vec<f64> = column.iter().map(|c| c / column[i].max(f64::MIN_POSITIVE)).collect();
-    let (fit, parameter) = (covariance.fit, &covariance.tangent.shared[i]);
+    let (fit, parameter) = (covariance.fit, &covariance.linearization.shared[i]);
     let is_closed = |side: f64| {
         let step: Vec<f64> = follow.iter().map(|f| f * side * half).collect();
-        let moved = apply_step(&fit.model, data, &covariance.tangent, &step, 1.0);
+        let moved = apply_step(&fit.model, data, &covariance.linearization, &step, 1.0);
         let by_prior =
             parameter.prior_nats(moved.get(role, 0)) - parameter.prior_nats(fit.model.get(role, 0));
         residuals(&moved, data)

@@ -78,7 +78,7 @@ fn estimate(covariance: &Covariance, p: &LabelledParameter) -> Option<(f64, f64)
             (role, covariance.gradient(effect, parameter), model.effects[effect].values[parameter])
         }
     };
-    let shared = &covariance.tangent.shared[covariance.index_of(role)?];
+    let shared = &covariance.linearization.shared[covariance.index_of(role)?];
     let mut unit = vec![0.0; covariance.factor.size()];
     unit[covariance.index_of(role)?] = 1.0;
     let in_fit_scale = covariance.deviation(&unit).0;

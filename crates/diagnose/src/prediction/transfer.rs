@@ -124,11 +124,10 @@ pub fn compare_groups(
     let training = diagnosis.training.as_ref().ok_or(DiagnoseError::NoTrainingSummary)?;
     let prepared = Prepared::new(scenario, Some(diagnosis), recordings);
     let n = recordings.len();
-    let targets: Vec<Target> = (0..n).map(|r| Target::new(&prepared, Some(training), r)).collect();
+    let targets: Vec<Target> = (0..n).map(|r| Target::new(&prepared, r)).collect();
     let all: Vec<usize> = (0..n).collect();
     let varying = Factor::ALL;
-    let fit = GroupFit::new(&prepared, Some(training), &targets, &Refit::ALL, &varying, &all)
-        .ok_or(DiagnoseError::NoFit)?;
+    let fit = GroupFit::new(&prepared, &targets, &Refit::ALL, &varying, &all).ok_or(DiagnoseError::NoFit)?;
     let information = fit.information(None);
     let group = GroupEstimate::from_information(&information, fit.group_sd);
     let model_recordings = training.runs.len();
@@ -152,7 +151,7 @@ pub fn compare_groups(
             }
         })
         .collect();
-    let model_n = prepared.misfit_n(Some(training));
+    let model_n = prepared.misfit_n();
     let rms_n = |of: &[usize], deviation: Values| fit.rms_n(of, |_| deviation).ok_or(DiagnoseError::NoFit);
     let (before_n, after_n) = (rms_n(&all, [0.0; PARAMETERS])?, rms_n(&all, group.full_mean)?);
     let extra_misfit_n = (after_n.powi(2) - model_n.powi(2)).max(0.0).sqrt();
@@ -163,7 +162,7 @@ pub fn compare_groups(
                 estimate: group.clone(),
                 extra_misfit_n,
             });
-            predict_one(&prepared, Some(training), target, None, group, &varying)
+            predict_one(&prepared, target, None, group, &varying)
         };
         let each: Option<Vec<_>> = targets.par_iter().map(|t| Some(one(t)?.1)).collect();
         each.ok_or(DiagnoseError::NoFit)

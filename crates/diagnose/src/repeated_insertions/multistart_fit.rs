@@ -128,7 +128,7 @@ pub(crate) fn fit_with_noise_updates(
 ) -> Option<(Fit, FitData)> {
     let mut data = data;
     let mut best: Option<Fit> = None;
-    for turns in rounds {
+    for iterations in rounds {
         let mut from = best.as_ref().map_or(model, |b| &b.model).clone();
         move_day_trend_to_rate(&mut from, &data);
         if let Some(best) = &best {
@@ -140,7 +140,8 @@ pub(crate) fn fit_with_noise_updates(
             update_event_times(&mut from, &data, drops);
             update_scatter(&mut from, &data, best);
         }
-        best = Some(fit_nonsmooth(&from, &data, Effort { max_iterations: *turns, min_gain_nats: 0.05 })?);
+        best =
+            Some(fit_nonsmooth(&from, &data, Effort { max_iterations: *iterations, min_gain_nats: 0.05 })?);
     }
     let best = best?;
     data = data.with_noise(discrepancy_noise(&data.recordings, &best.residuals.residual_n, data.floor_n));
@@ -194,10 +195,10 @@ fn move_day_trend_to_rate(model: &mut Model, data: &FitData) {
 /// Updates the scatter between recordings and between days: mean square of the estimates plus their conditional variance (expectation
 /// maximisation with the curvature of the fit). A parameter without information keeps its scatter.
 fn update_scatter(model: &mut Model, data: &FitData, at: &Fit) {
-    let tangent = Linearization::new(&at.model, data, &at.residuals);
-    let (count, random_effects) = (data.recording_count(), tangent.per_recording.len());
+    let linearization = Linearization::new(&at.model, data, &at.residuals);
+    let (count, random_effects) = (data.recording_count(), linearization.per_recording.len());
     let conditional = |places: &[usize]| -> Vec<f64> {
-        let factor = tangent.normal_matrix.submatrix(places).cholesky();
+        let factor = linearization.normal_matrix.submatrix(places).cholesky();
         (0..places.len())
             .map(|i| {
                 let unit: Vec<f64> = (0..places.len()).map(|j| f64::from(u8::from(i == j))).collect();
@@ -209,16 +210,19 @@ fn update_scatter(model: &mut Model, data: &FitData, at: &Fit) {
     for r in 0..count {
         // Random effects without information are skipped.
         let moves: Vec<usize> = (0..random_effects)
-            .filter(|o| tangent.normal_matrix.at(tangent.index_of(*o, r), tangent.index_of(*o, r)) > 0.0)
+            .filter(|o| {
+                linearization.normal_matrix.at(linearization.index_of(*o, r), linearization.index_of(*o, r))
+                    > 0.0
+            })
             .collect();
-        let places: Vec<usize> = moves.iter().map(|o| tangent.index_of(*o, r)).collect();
+        let places: Vec<usize> = moves.iter().map(|o| linearization.index_of(*o, r)).collect();
         for (o, variance) in moves.iter().zip(conditional(&places)) {
-            let x = at.model.get(tangent.per_recording[*o].role, r);
+            let x = at.model.get(linearization.per_recording[*o].role, r);
             sums[*o].0 += x * x + variance;
             sums[*o].1 += 1.0;
         }
     }
-    for (n, (sum, count)) in tangent.per_recording.iter().zip(&sums) {
+    for (n, (sum, count)) in linearization.per_recording.iter().zip(&sums) {
         let sd = (sum / f64::max(*count, 1.0)).sqrt();
         match n.role {
             ParameterRole::RecordingSurface => model.scatter.surface_m = sd,
@@ -228,7 +232,7 @@ fn update_scatter(model: &mut Model, data: &FitData, at: &Fit) {
         }
     }
     let mut days = [(0.0, 0.0); 2];
-    for (i, n) in tangent.shared.iter().enumerate() {
+    for (i, n) in linearization.shared.iter().enumerate() {
         let kind = match n.role {
             ParameterRole::DaySurface(_) => 0,
             ParameterRole::DayFriction(_) => 1,

@@ -86,9 +86,9 @@ impl Population {
     pub(crate) fn with_parameter_uncertainty(self, fitted: &SetFit) -> Self {
         let model = &fitted.fit.model;
         let open = residuals(model, &fitted.data).map(|at| {
-            let tangent = Linearization::new(model, &fitted.data, &at);
-            let factor = tangent.factor();
-            (tangent.shared, factor)
+            let linearization = Linearization::new(model, &fitted.data, &at);
+            let factor = linearization.factor();
+            (linearization.shared, factor)
         });
         Self { parameter_information: open, ..self }
     }

@@ -225,8 +225,8 @@ pub fn shaft_slip_start(assumed: &Tissue, recordings: &[&SegmentedRecording], gu
         effects.push(ReleaseDepth { layer: l + 1, depth_m }.into());
     }
     let layers = tissue.layers.len();
-    let belief = weak_prior(tissue, leaves);
-    let mut model = Model::base(Arc::new(belief), recordings.len());
+    let prior = weak_prior(tissue, leaves);
+    let mut model = Model::base(Arc::new(prior), recordings.len());
     model.effects = effects.iter().map(EffectTerm::of).collect();
     model.tied = bound;
     model.free = FreeParameters {

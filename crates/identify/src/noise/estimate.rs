@@ -105,10 +105,10 @@ impl Noise {
         };
         // A slow drift that the data do not exclude widens confidence intervals, so the largest stationary order is used.
         let largest = from.has_long_memory();
-        let turns = if from == NoiseSource::Bootstrap { 1 } else { IRLS_ITERATIONS };
+        let iterations = if from == NoiseSource::Bootstrap { 1 } else { IRLS_ITERATIONS };
         for order in (0..=most).map(|k| if largest { most - k } else { k }) {
             let columns: Vec<usize> = (1..=order).collect();
-            let (a, s) = robust_linear_prediction(&rows, &columns, (sd_n, floor_n), HUBER_K, turns);
+            let (a, s) = robust_linear_prediction(&rows, &columns, (sd_n, floor_n), HUBER_K, iterations);
             let (near, slow) = a[1..].split_at(AR_ORDER);
             if !stationary(near) || (order > AR_ORDER && a[1..].iter().sum::<f64>() > 0.999) {
                 continue;
@@ -140,7 +140,7 @@ impl Noise {
             // Predictors of the first blocks after a break use the blocks since the break and those before it.
             for (run, first) in best.after_break.iter_mut().enumerate() {
                 let columns: Vec<usize> = (1..=run).chain(AR_ORDER + 1..ROW_LEN).collect();
-                let (a, s) = robust_linear_prediction(&rows, &columns, (sd_n, floor_n), HUBER_K, turns);
+                let (a, s) = robust_linear_prediction(&rows, &columns, (sd_n, floor_n), HUBER_K, iterations);
                 let (near, slow) = a[1..].split_at(AR_ORDER);
                 *first = AfterBreak {
                     ar: core::array::from_fn(|i| near[i]),

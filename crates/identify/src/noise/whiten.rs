@@ -76,11 +76,11 @@ impl Noise {
 
     /// Normalised innovations of residuals `e` (N) of a recording; zero in blocks that are not compared.
     #[must_use]
-    pub fn whiten(&self, laid: &WhiteningPlan, e: &[f64]) -> Vec<f64> {
-        let sums = match (laid.has_long_memory, self.long_memory) {
+    pub fn whiten(&self, plan: &WhiteningPlan, e: &[f64]) -> Vec<f64> {
+        let sums = match (plan.has_long_memory, self.long_memory) {
             (false, _) => Vec::new(),
             (true, false) => running_sums(e, |_| true),
-            (true, true) => running_sums(e, |k| laid.rows[k].sd_n.is_finite()),
+            (true, true) => running_sums(e, |k| plan.rows[k].sd_n.is_finite()),
         };
         let one = |k: usize, row: &BlockWhitening| {
             if row.sd_n == f64::INFINITY {
@@ -93,7 +93,7 @@ impl Noise {
             {
                 w -= a * before;
             }
-            if laid.has_long_memory && *slow != [0.0; STRETCHES.len()] {
+            if plan.has_long_memory && *slow != [0.0; STRETCHES.len()] {
                 for (mean, slow) in stretch_means(&sums, k, row.memory_blocks as usize).iter().zip(slow) {
                     w -= slow * mean;
                 }
@@ -102,21 +102,21 @@ impl Noise {
         };
         let mut out = vec![0.0; e.len()];
         // Whitened values are zero before the first non-zero residual, and after the last one beyond the memory.
-        let reach = if laid.has_long_memory { STRETCHES[STRETCHES.len() - 1].1 } else { AR_ORDER };
+        let reach = if plan.has_long_memory { STRETCHES[STRETCHES.len() - 1].1 } else { AR_ORDER };
         let first = e.iter().position(|e| *e != 0.0).unwrap_or(e.len());
         let end = e.iter().rposition(|e| *e != 0.0).map_or(0, |k| (k + 1 + reach).min(e.len()));
         let mut at = first;
-        for &(from, to, bin) in laid.plain_runs.iter().chain([&(e.len(), e.len(), 0)]) {
+        for &(from, to, bin) in plan.plain_runs.iter().chain([&(e.len(), e.len(), 0)]) {
             let (from, to) = (from.clamp(first, end.max(first)), to.min(end));
             for k in at..from {
-                out[k] = one(k, &laid.rows[k]);
+                out[k] = one(k, &plan.rows[k]);
             }
             if from >= to {
                 at = at.max(from);
                 continue;
             }
             let a = &self.bins[bin as usize].ar;
-            let rows = &laid.rows[from..to];
+            let rows = &plan.rows[from..to];
             for ((out, row), e) in
                 out[from..to].iter_mut().zip(rows).zip(e[from - AR_ORDER..to].windows(AR_ORDER + 1))
             {
@@ -134,10 +134,10 @@ impl Noise {
     /// Residuals (N) of a recording with normalised innovations `w`: the inverse of [`whiten`](Self::whiten),
     /// zero in blocks that are not compared.
     #[must_use]
-    pub fn unwhiten(&self, laid: &WhiteningPlan, w: &[f64]) -> Vec<f64> {
+    pub fn unwhiten(&self, plan: &WhiteningPlan, w: &[f64]) -> Vec<f64> {
         let mut e = vec![0.0; w.len()];
         let mut sums = vec![0.0; w.len() + 1];
-        for (k, row) in laid.rows.iter().enumerate() {
+        for (k, row) in plan.rows.iter().enumerate() {
             if row.sd_n.is_finite() {
                 let (near, slow) = self.predictor(row);
                 let run = AR_ORDER.min(row.blocks_since_break as usize);
@@ -145,7 +145,7 @@ impl Noise {
                 for (a, before) in near.iter().zip(e[k - run..k].iter().rev()) {
                     x += a * before;
                 }
-                if laid.has_long_memory {
+                if plan.has_long_memory {
                     let means = stretch_means(&sums, k, row.memory_blocks as usize);
                     x += means.iter().zip(slow).map(|(mean, slow)| slow * mean).sum::<f64>();
                 }
