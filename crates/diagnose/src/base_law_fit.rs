@@ -204,14 +204,6 @@ pub(crate) fn coarse_refit(
     fit(&with_updated_times(model, coarse, &prepared.drop_times()), coarse, COARSE_EFFORT)
 }
 
-/// Fits the base law with baseline effects from the prior; returns the fit and the data with the noise estimated from it.
-pub(crate) fn fit_with_baseline(
-    prepared: &PreparedRecordings,
-    effects: &[EffectTerm],
-) -> Option<(Fit, FitData)> {
-    fit_from_prior(prepared, effects, (false, false))
-}
-
 /// Refits the base law with a surface position and a friction factor per recording. The refit is kept if it reduces the objective so
 /// strongly that the first fit must have mistaken differences between recordings for ruptures.
 pub(crate) fn refit_with_random_effects(
@@ -276,7 +268,7 @@ fn fit_with_assigned_drops(
 }
 
 /// Fit from the prior: assigned drops, then rounds in which noise, rupture times and parameters are updated.
-fn fit_from_prior(
+pub(crate) fn fit_from_prior(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
     random_effects: RandomEffects,

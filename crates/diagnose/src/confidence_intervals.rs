@@ -173,6 +173,13 @@ impl<'a> Covariance<'a> {
         self.linearization.shared.iter().position(|n| n.role == role)
     }
 
+    /// Gradient of `scale` times a shared parameter; `None` when it is not free.
+    pub(crate) fn shared_gradient(&self, role: ParameterRole, scale: f64) -> Option<Vec<f64>> {
+        let mut gradient = vec![0.0; self.factor.size()];
+        gradient[self.index_of(role)?] = scale;
+        Some(gradient)
+    }
+
     /// Gradient of a parameter of an effect with respect to the fitted parameters.
     pub(crate) fn gradient(&self, effect: usize, parameter: usize) -> Vec<f64> {
         let value = self.fit.model.effects[effect].values[parameter];
@@ -193,9 +200,7 @@ impl<'a> Covariance<'a> {
     /// free.
     pub fn shared_parameter(&self, role: ParameterRole) -> Option<(f64, f64)> {
         let i = self.index_of(role)?;
-        let mut unit = vec![0.0; self.linearization.normal_matrix.size];
-        unit[i] = 1.0;
-        let half = self.half_width(&unit);
+        let half = self.half_width(&self.shared_gradient(role, 1.0)?);
         let by_prior = || {
             self.linearization.shared[i].prior_sd * student_t::quantile(UPPER_PROBABILITY, INFINITE_FREEDOM)
         };

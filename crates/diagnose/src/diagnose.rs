@@ -17,7 +17,7 @@ use crate::held_out::{
 };
 use crate::identifiability::{advice, not_identifiable, visible_effects};
 use crate::input_checks::{
-    CleanRecordings, NamedRecording, check_recordings, clean_recordings, force_outlier_notes,
+    CleanRecordings, NamedRecording, average_blocks, check_recordings, clean_recordings, force_outlier_notes,
 };
 use crate::measured_start::{first_effect, search_from_any_start};
 use crate::model_grade::grade;
@@ -30,7 +30,7 @@ use crate::sensor_artefact_causes::sensor_artefact_causes;
 use crate::verdict::{Assessment, assess_search, is_kept, move_negligible};
 use crate::zero_steps::{ZeroStepReport, zero_effects};
 use std::sync::Arc;
-use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::block_averages::BLOCK_S;
 use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::FitData;
 use stylet_record::sensor_artefacts::SensorArtefacts;
@@ -62,8 +62,6 @@ pub struct DiagnosisResult {
     pub competing_effects: Vec<Vec<CompetingEffect>>,
     /// Held-out residuals of the base law.
     pub base_held_out: Vec<Option<FreeRunResidual>>,
-    /// Held-out residuals of the extended model.
-    pub extended_held_out: Vec<Option<FreeRunResidual>>,
 }
 
 /// Reason why an effect is negligible in the presence of an unmodelled one.
@@ -211,9 +209,9 @@ pub(crate) fn diagnose_given_layers(
         rmse_after_n: pooled_rms(&extended_held_out, &search.data),
         rmse_given_scatter_n: pooled_rms_given_scatter(&extended_held_out, &search.data),
         floor_n: noise_n,
-        per_recording_n: errors_per_recording(&base_held_out, &extended_held_out, &search)
-            .into_iter()
-            .map(|(before, after)| (with_tones(before), after))
+        per_recording_n: errors_per_recording_n(&base_held_out, &search)
+            .map(with_tones)
+            .zip(errors_per_recording_n(&extended_held_out, &search))
             .collect(),
     };
     let mut data_quality = Vec::new();
@@ -269,7 +267,6 @@ pub(crate) fn diagnose_given_layers(
         search,
         competing_effects: competing,
         base_held_out,
-        extended_held_out,
     })
 }
 
@@ -297,11 +294,8 @@ fn prepare(
 ) -> (PreparedRecordings, Vec<FastTone>) {
     let tones = remove_fast_tones(clean, &raw.exclude, BLOCK_S);
     let assumed = Arc::new(without_removed_tones(assumptions_of(scenario), &tones));
-    let blocks: Vec<BlockAverages> =
-        clean.par_iter().zip(&raw.exclude).map(|(r, x)| BlockAverages::new(r, x, BLOCK_S)).collect();
-    let quantisation_n = raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD;
-    let replayed = Arc::clone(replayed);
-    (PreparedRecordings { replayed, ..PreparedRecordings::new(assumed, blocks, quantisation_n) }, tones)
+    let prepared = PreparedRecordings::new(assumed, average_blocks(clean, raw), raw.quantisation_sd_n());
+    (PreparedRecordings { replayed: Arc::clone(replayed), ..prepared }, tones)
 }
 
 /// The best model with at most one effect, if it leaves only noise; `None` also when the limit of replays was reached before.
@@ -335,17 +329,14 @@ fn labels_of_causes(
     (labels.into_iter().filter(is_kept).collect(), rows.collect())
 }
 
-fn errors_per_recording(
-    before: &[Option<FreeRunResidual>],
-    after: &[Option<FreeRunResidual>],
+/// RMS error (N) of each recording, including the noise of samples within their blocks.
+fn errors_per_recording_n(
+    residuals: &[Option<FreeRunResidual>],
     search: &Search,
-) -> Vec<(f64, f64)> {
-    let one = |l: &Option<FreeRunResidual>, k: usize| {
-        l.as_ref().map_or(f64::NAN, |l| {
-            (l.mean_square_n2 + search.data.recordings[k].within_block_sd_n().powi(2)).sqrt()
-        })
-    };
-    before.iter().zip(after).enumerate().map(|(k, (b, a))| (one(b, k), one(a, k))).collect()
+) -> impl Iterator<Item = f64> {
+    residuals.iter().zip(search.data.recordings.iter()).map(|(l, b)| {
+        l.as_ref().map_or(f64::NAN, |l| (l.mean_square_n2 + b.within_block_sd_n().powi(2)).sqrt())
+    })
 }
 
 /// Standard deviations of the random effects of the best model.

@@ -222,7 +222,8 @@ impl Search {
         full
     }
 
-    fn penalty_of(&self, model: &Model) -> f64 {
+    /// BIC penalty (nats) of the effects and steps of a model.
+    pub(crate) fn penalty_of(&self, model: &Model) -> f64 {
         bic_penalty(model.effect_parameter_count(), self.data.compared_block_count())
     }
 

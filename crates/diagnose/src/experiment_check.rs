@@ -7,14 +7,15 @@ use crate::confidence_intervals::Covariance;
 use crate::diagnosis_json::{BaseParameter, LabelledParameter, ParameterLabel};
 use crate::error::DiagnoseError;
 use crate::identifiability::visible_effects;
-use crate::input_checks::{CleanRecordings, NamedRecording, check_recordings, clean_recordings};
+use crate::input_checks::{
+    CleanRecordings, NamedRecording, average_blocks, check_recordings, clean_recordings,
+};
 use crate::parameter_labels::label_parameters;
 use crate::verdict::{BOOTSTRAP_SEED, base_parameters};
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use stylet_core::{EnhanceConfig, Sample};
-use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
 use stylet_record::{QualityKind, QualityNote, Recording};
 use stylet_scenario::Scenario;
 use stylet_score::{ContactFinding, ContactHypothesis, Trace};
@@ -65,10 +66,9 @@ pub fn check_experiment(
     }
     let CleanRecordings { recordings: clean, notes, raw } = clean_recordings(recordings);
     out.items = check_before_fit(scenario, recordings, &clean, &notes);
-    let blocks: Vec<BlockAverages> =
-        clean.par_iter().zip(&raw.exclude).map(|(r, x)| BlockAverages::new(r, x, BLOCK_S)).collect();
-    let min_noise_n = raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD;
-    let prepared = PreparedRecordings::new(Arc::new(assumptions_of(scenario)), blocks, min_noise_n);
+    let blocks = average_blocks(&clean, &raw);
+    let prepared =
+        PreparedRecordings::new(Arc::new(assumptions_of(scenario)), blocks, raw.quantisation_sd_n());
     let (fit, data) = fit_base_law(&prepared).ok_or(DiagnoseError::NoFit)?;
     let covariance = Covariance::new(&fit, &data, &mut ChaCha8Rng::seed_from_u64(BOOTSTRAP_SEED));
     out.base_parameters = base_parameters(&covariance);

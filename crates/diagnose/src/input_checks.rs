@@ -1,9 +1,11 @@
 //! Checks recordings for plausibility against the scenario (length, reach, units, signs), and cleans them.
 
 use crate::error::DiagnoseError;
+use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
 use stylet_record::sensor_artefacts::{SensorArtefacts, find_sensor_artefacts};
 use stylet_record::{MIN_SAMPLES, QualityKind, QualityNote, Recording, assess};
 use stylet_scenario::Scenario;
+use stylet_stats::parallel::*;
 use stylet_tissue::{ForceLaw, replay};
 
 /// A recording with its name.
@@ -277,6 +279,11 @@ pub(crate) fn clean_recordings(named: &[NamedRecording]) -> CleanRecordings {
     let borrowed: Vec<&Recording> = recordings.iter().collect();
     let raw = find_sensor_artefacts(&borrowed, &notes);
     CleanRecordings { recordings, notes, raw }
+}
+
+/// Blocks of recordings, without the samples that sensor artefacts exclude.
+pub(crate) fn average_blocks(recordings: &[Recording], raw: &SensorArtefacts) -> Vec<BlockAverages> {
+    recordings.par_iter().zip(&raw.exclude).map(|(r, x)| BlockAverages::new(r, x, BLOCK_S)).collect()
 }
 
 /// The recording without non-finite samples.

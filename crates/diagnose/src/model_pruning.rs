@@ -53,19 +53,14 @@ impl Search {
             if n < 2 {
                 return;
             }
-            let blocks = self.data.compared_block_count();
-            let reduced: Vec<(usize, Fit)> = (0..n)
+            let reduced: Vec<Fit> = (0..n)
                 .into_par_iter()
-                .filter_map(|k| Some((k, fit(&self.best.model.without_effect(k), &self.data, Effort::FULL)?)))
+                .filter_map(|k| fit(&self.best.model.without_effect(k), &self.data, Effort::FULL))
                 .collect();
             let surplus = |f: &Fit| {
-                let saved = bic_penalty(
-                    self.best.model.effect_parameter_count() - f.model.effect_parameter_count(),
-                    blocks,
-                ) + MIN_GAIN_NATS;
-                likelihood_gain(f, &self.best, &self.data) - saved
+                likelihood_gain(f, &self.best, &self.data) - required_gain_nats(f, &self.best, &self.data)
             };
-            let worst = reduced.into_iter().map(|(_, f)| (surplus(&f), f)).min_by(|a, b| a.0.total_cmp(&b.0));
+            let worst = reduced.into_iter().map(|f| (surplus(&f), f)).min_by(|a, b| a.0.total_cmp(&b.0));
             match worst {
                 Some((surplus, f)) if surplus < 0.0 => self.accept(f),
                 _ => return,

@@ -90,8 +90,7 @@ fn base_entries(covariance: &Covariance, base: &[BaseParameter]) -> Vec<Entry> {
     let tissue = &covariance.fit.model.tissue;
     let entry = |b: &BaseParameter| {
         let (role, scale) = base_role(&covariance.fit.model, b.layer, &b.name)?;
-        let mut gradient = vec![0.0; covariance.factor.size()];
-        gradient[covariance.index_of(role)?] = scale;
+        let gradient = covariance.shared_gradient(role, scale)?;
         let label = match (b.at_least, b.at_bound) {
             (true, _) => ParameterLabel::OneSided,
             (false, true) => ParameterLabel::AtBound,
@@ -137,8 +136,7 @@ fn effect_entries(covariance: &Covariance, causes: &[Cause]) -> Vec<Entry> {
 fn profile_label(covariance: &Covariance, data: &FitData, role: ParameterRole) -> ParameterLabel {
     let Some(i) = covariance.index_of(role) else { return ParameterLabel::Determined };
     let Some((_, half)) = covariance.shared_parameter(role) else { return ParameterLabel::Determined };
-    let mut unit = vec![0.0; covariance.factor.size()];
-    unit[i] = 1.0;
+    let Some(unit) = covariance.shared_gradient(role, 1.0) else { return ParameterLabel::Determined };
     let column = covariance.factor.solve(&unit);
     let follow: Vec<f64> = column.iter().map(|c| c / column[i].max(f64::MIN_POSITIVE)).collect();
     let (fit, parameter) = (covariance.fit, &covariance.linearization.shared[i]);

@@ -7,9 +7,9 @@ use super::uncertainty::{Uncertainty, free_run_force};
 use super::zero_offset::zero_offset_n;
 use crate::base_law_fit::assumptions_of;
 use crate::diagnosis_json::Diagnosis;
-use crate::input_checks::{NamedRecording, clean_recordings};
+use crate::input_checks::{NamedRecording, average_blocks, clean_recordings};
 use std::sync::Arc;
-use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::Model;
 use stylet_identify::noise::Noise;
@@ -39,12 +39,7 @@ impl<'a> Prepared<'a> {
     /// Cleans and averages the recordings, and sets up the model of the scenario.
     pub fn new(scenario: &Scenario, diagnosis: Option<&'a Diagnosis>, evidence: &[NamedRecording]) -> Self {
         let ready = clean_recordings(evidence);
-        let blocks: Vec<BlockAverages> = ready
-            .recordings
-            .par_iter()
-            .zip(&ready.raw.exclude)
-            .map(|(r, x)| BlockAverages::new(r, x, BLOCK_S))
-            .collect();
+        let blocks = average_blocks(&ready.recordings, &ready.raw);
         let uncertainty = Uncertainty::new(diagnosis, &blocks);
         let model = Model::base(Arc::new(assumptions_of(scenario)), blocks.len());
         let data = FitData::new(Arc::new(blocks), Noise::white(uncertainty.block_n), 0.0);

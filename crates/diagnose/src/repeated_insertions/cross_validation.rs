@@ -6,7 +6,6 @@ use super::multistart_fit::{SetFit, fit_with_noise_updates};
 use super::population_prediction::{DRAWS, PredictedForce, predict_force};
 use super::random_effects_population::Population;
 use super::segmented_recording::{SegmentedRecording, group_by_speed_and_stroke};
-use stylet_identify::model::NO_RUPTURE;
 use stylet_stats::interpolate;
 use stylet_stats::parallel::*;
 
@@ -30,7 +29,7 @@ pub struct PredictionScore {
 pub(crate) fn score_prediction(run: &SegmentedRecording, p: &PredictedForce) -> PredictionScore {
     let r = &run.recording;
     let mut out = PredictionScore::default();
-    let first = run.ruptures_s.iter().copied().fold(NO_RUPTURE, f64::min);
+    let first = run.first_rupture_s();
     let (mut sum, mut inside) = (0.0, 0.0);
     let limit_n = run.limit_n.map_or(f64::INFINITY, f64::abs);
     let clamped = |f: f64| f.clamp(-limit_n, limit_n);

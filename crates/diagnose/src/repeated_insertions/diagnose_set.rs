@@ -13,7 +13,7 @@ use super::parameter_estimates::{ParameterEstimate, base_parameters, jackknife_e
 use super::repeatability_report::{
     AblationRow, MeanReport, RepeatabilityReport, ReportInputs, repeatability_report,
 };
-use super::scored_model::{ModelFamily, ScoredModel, active_effects, shaft_slip_info};
+use super::scored_model::{ModelFamily, ScoredModel, active_effects};
 use super::segmented_recording::{SegmentedRecording, have_several_speeds};
 use crate::claims::{self, Context, SIGNIFICANT_P_VALUE};
 use crate::diagnosis_json::{
@@ -28,7 +28,7 @@ use std::collections::BTreeMap;
 use stylet_identify::insertion_phases::noise_n;
 use stylet_record::sensor_artefacts;
 use stylet_scenario::Scenario;
-use stylet_tissue::{DelayedPuncture, Effect, PowerLawFriction, RateDependentPuncture, Tissue};
+use stylet_tissue::{DelayedPuncture, Effect, PowerLawFriction, RateDependentPuncture, ShaftSlip, Tissue};
 
 /// Seed of the random start values, constant so that equal recordings give equal results.
 const START_VALUE_SEED: u64 = 1;
@@ -67,6 +67,12 @@ impl SetDiagnosis {
         }
         claims::apply(d, &Context::default());
         d.grade = Some(grade(d, 0.0));
+    }
+
+    /// Runs the nested cross-validation and adds it to the report.
+    pub fn run_nested_cross_validation(&mut self) {
+        let recordings: Vec<&SegmentedRecording> = self.recordings.iter().collect();
+        self.report.nested = nested_cross_validation(&self.candidates, &recordings);
     }
 }
 
@@ -127,14 +133,6 @@ pub fn diagnose_set(
     })
 }
 
-impl SetDiagnosis {
-    /// Runs the nested cross-validation and adds it to the report.
-    pub fn run_nested_cross_validation(&mut self) {
-        let recordings: Vec<&SegmentedRecording> = self.recordings.iter().collect();
-        self.report.nested = nested_cross_validation(&self.candidates, &recordings);
-    }
-}
-
 /// Leave-one-out predictions of the base law; `best` are those of the best model.
 fn base_predictions(
     candidates: &CandidateModels,
@@ -150,28 +148,21 @@ fn base_predictions(
 
 /// Held-out errors of the candidate models and of the ablated terms.
 fn ablation_rows(candidates: &CandidateModels) -> Vec<AblationRow> {
-    let mut rows = Vec::new();
-    let row = |step: String, candidate: &ScoredModel| AblationRow {
-        step,
+    let model = |step: &str, candidate: &ScoredModel| AblationRow {
+        step: step.to_owned(),
         held_out_n: candidate.held_out_n(),
         without_n: None,
         kept: candidate.family == candidates.best.family,
     };
-    if let Some(candidate) = &candidates.library {
-        rows.push(row("base law with library effects".to_owned(), candidate));
-    }
-    if let Some(candidate) = &candidates.slip {
-        rows.push(row("stick-slip of the shaft".to_owned(), candidate));
-    }
-    for term in &candidates.terms {
-        rows.push(AblationRow {
-            step: term.name.clone(),
-            held_out_n: candidates.best.held_out_n(),
-            without_n: Some(stylet_stats::mean(&term.without_n)).filter(|e| e.is_finite()),
-            kept: term.kept,
-        });
-    }
-    rows
+    let term = |term: &ModelTerm| AblationRow {
+        step: term.name.clone(),
+        held_out_n: candidates.best.held_out_n(),
+        without_n: Some(stylet_stats::mean(&term.without_n)).filter(|e| e.is_finite()),
+        kept: term.kept,
+    };
+    let library = candidates.library.as_ref().map(|c| model("base law with library effects", c));
+    let slip = candidates.slip.as_ref().map(|c| model("stick-slip of the shaft", c));
+    library.into_iter().chain(slip).chain(candidates.terms.iter().map(term)).collect()
 }
 
 fn diagnosis(
@@ -195,21 +186,12 @@ fn diagnosis(
         .into_iter()
         .filter(|id| !unsure(id))
         .map(|id| {
-            let whole =
-                if id == shaft_slip_info().id { Some(candidates.base.errors_n.clone()) } else { None };
-            let without = whole
-                .or_else(|| {
-                    candidates.terms.iter().find(|p| p.kept && p.name == id).map(|p| p.without_n.clone())
-                })
-                .unwrap_or_default();
-            cause(
-                id,
-                &estimates,
-                paired_confidence(&without, &best.errors_n),
-                &without,
-                best,
-                &candidates.base,
-            )
+            let term = candidates.terms.iter().find(|p| p.kept && p.name == id);
+            let without = match id {
+                ShaftSlip::ID => &candidates.base.errors_n[..],
+                _ => term.map_or(&[][..], |p| &p.without_n),
+            };
+            cause(id, &estimates, without, best, &candidates.base)
         })
         .collect();
     causes.sort_by(|a, b| b.share.total_cmp(&a.share));
@@ -307,11 +289,7 @@ fn add_fault(causes: &mut Vec<Cause>, fault: Cause, is_corrected: bool) {
 
 /// Effects that recordings at a single speed do not identify.
 fn unidentified_effects(best: &ScoredModel, recordings: &[&SegmentedRecording]) -> Vec<String> {
-    let all = [
-        PowerLawFriction { exponent: 1.0 }.info().id,
-        RateDependentPuncture { alpha: 0.0 }.info().id,
-        DelayedPuncture::default().info().id,
-    ];
+    let all = [PowerLawFriction::ID, RateDependentPuncture::ID, DelayedPuncture::ID];
     let named = active_effects(&best.set_fit.fit.model);
     let unidentified = all.iter().filter(|id| !have_several_speeds(recordings) && !named.contains(id));
     unidentified.map(|id| (*id).to_owned()).collect()
@@ -320,7 +298,6 @@ fn unidentified_effects(best: &ScoredModel, recordings: &[&SegmentedRecording]) 
 fn cause(
     id: &str,
     estimates: &[ParameterEstimate],
-    confidence: f64,
     without: &[f64],
     best: &ScoredModel,
     base: &ScoredModel,
@@ -334,7 +311,7 @@ fn cause(
     let share = (square(without) - square(&best.errors_n)) / explained;
     Cause {
         effect: id.to_owned(),
-        confidence,
+        confidence: paired_confidence(without, &best.errors_n),
         parameters,
         gain_nats: (base.set_fit.fit.nats() - best.set_fit.fit.nats()).max(0.0),
         share: if share.is_finite() { share.clamp(0.0, 1.0) } else { 1.0 },
@@ -371,7 +348,7 @@ fn search_step(candidates: &CandidateModels) -> SearchStep {
         screened_only: false,
     };
     let mut all = Vec::new();
-    all.extend(candidates.slip.as_ref().map(|l| tried(shaft_slip_info().id, l)));
+    all.extend(candidates.slip.as_ref().map(|l| tried(ShaftSlip::ID, l)));
     all.extend(
         candidates.library.as_ref().map(|l| tried(&active_effects(&l.set_fit.fit.model).join(", "), l)),
     );

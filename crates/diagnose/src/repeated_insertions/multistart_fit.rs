@@ -3,7 +3,7 @@
 
 use super::segmented_recording::{SPEED_TOLERANCE, SegmentedRecording};
 use super::start_values::{
-    EXPECTED_DAY_FRICTION_SD, EXPECTED_DAY_SURFACE_SD_M, SLIP_RATE_INDEX, StartValues, shaft_slip_start,
+    EXPECTED_DAY_FRICTION_SD, EXPECTED_DAY_SURFACE_SD_M, StartValues, is_rate_held, shaft_slip_start,
 };
 use crate::base_law_fit::COARSENING_FACTOR;
 use rand::{RngExt, rngs::ChaCha8Rng};
@@ -158,9 +158,6 @@ fn ln_speed(blocks: &BlockAverages) -> f64 {
 /// Moves the part of the day effects on friction that is linear in the logarithm of speed to the rate exponent. The force is the same, but
 /// the day effects are smaller, and a fit makes little progress along this valley of the objective.
 fn move_day_trend_to_rate(model: &mut Model, data: &FitData) {
-    let held = |e: usize| {
-        model.tied.iter().any(|b| (b.effect, b.parameter, b.tied_to) == (e, SLIP_RATE_INDEX, None))
-    };
     let is_slip = |e: &usize| matches!(model.effects[*e].effect(), Some(AnyEffect::ShaftSlip(_)));
     let which: Vec<usize> = (0..model.effects.len()).filter(is_slip).collect();
     let speed =
@@ -174,7 +171,7 @@ fn move_day_trend_to_rate(model: &mut Model, data: &FitData) {
         (square + (s - x).powi(2), product + (s - x) * model.days[*d].ln_friction)
     });
     if which.is_empty()
-        || which.iter().any(|e| held(*e))
+        || which.iter().any(|e| is_rate_held(model, *e))
         || square < libm::log1p(SPEED_TOLERANCE).powi(2) / 2.0
     {
         return;

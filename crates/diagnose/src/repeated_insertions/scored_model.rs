@@ -9,7 +9,7 @@ use crate::base_law_fit::COARSENING_FACTOR;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::model::Model;
 use stylet_stats::parallel::*;
-use stylet_tissue::{Effect, EffectInfo, ShaftSlip};
+use stylet_tissue::Effect;
 
 /// Number of cross-validation folds for more than [`LEAVE_ONE_OUT_LIMIT`] recordings.
 const FOLDS: usize = 3;
@@ -135,11 +135,6 @@ fn held_out_scores(
 /// Held-out RMS error (N) per recording; infinite without a prediction.
 pub(super) fn rms_errors_n(scores: &[Option<PredictionScore>]) -> Vec<f64> {
     scores.iter().map(|s| s.as_ref().map_or(f64::INFINITY, |s| s.rmse_n)).collect()
-}
-
-/// The `shaft_slip` effect.
-pub(crate) fn shaft_slip_info() -> &'static EffectInfo {
-    ShaftSlip::default().info()
 }
 
 /// Active effects of a model, without repetition.

@@ -69,13 +69,16 @@ impl SegmentedRecording {
             recording,
         }
     }
-}
 
-impl SegmentedRecording {
     /// Abrupt force drops before the retraction.
     #[must_use]
     pub fn drops(&self) -> Vec<AbruptDrop> {
         abrupt_drops(&self.recording, &self.phases)
+    }
+
+    /// Time (s) of the first rupture; [`NO_RUPTURE`] without one.
+    pub(crate) fn first_rupture_s(&self) -> f64 {
+        self.ruptures_s.iter().copied().fold(NO_RUPTURE, f64::min)
     }
 
     /// Standard deviation of the sensor noise in N.

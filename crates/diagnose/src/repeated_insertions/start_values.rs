@@ -70,6 +70,11 @@ struct LayerGeometry {
     indented_m: Vec<f64>,
 }
 
+/// Whether the rate exponent of a `shaft_slip` effect is held constant, as at one speed.
+pub(super) fn is_rate_held(model: &Model, effect: usize) -> bool {
+    model.tied.iter().any(|b| (b.effect, b.parameter, b.tied_to) == (effect, SLIP_RATE_INDEX, None))
+}
+
 /// Median over the recordings that show a value.
 fn median_over(
     recordings: &[&SegmentedRecording],

@@ -1,10 +1,11 @@
 use super::super::group_deviation::Factor;
 use super::super::group_update::GroupEstimate;
-use super::super::insertion_course::{BINS, Curve, InsertionCourse};
+use super::super::insertion_course::{BINS, InsertionCourse};
 use super::super::prepared::Prepared;
+use super::super::target::Target;
 use super::super::training_curves::TrainingSummary;
 use super::super::uncertainty::{Uncertainty, free_run_force};
-use super::{Band, NOISE_VALUES, SEED, noise_values};
+use super::{NOISE_VALUES, SEED, noise_values};
 use crate::diagnosis_json::{Cause, Diagnosis, Estimate, LabelledParameter, ParameterLabel, RandomEffectSd};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;

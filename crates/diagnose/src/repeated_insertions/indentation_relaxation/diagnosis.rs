@@ -1,13 +1,13 @@
 //! Converts the analysis of many indented specimens to a diagnosis.
 
-use super::{SpecimenReport, relaxation};
+use super::SpecimenReport;
 use crate::claims::{self, Context};
 use crate::diagnosis_json::{
     Cause, DataQualityNote, Diagnosis, Estimate, Gain, NoiseReport, ResidualStructureReport, Verdict,
 };
 use crate::repeated_insertions::segmented_recording::SegmentedRecording;
 use stylet_record::QualityNote;
-use stylet_tissue::{AnyEffect, Effect, PowerLawFriction, RateDependentPuncture, ShaftSlip};
+use stylet_tissue::{PowerLawFriction, RateDependentPuncture, ShaftSlip, StressRelaxation};
 
 impl SpecimenReport {
     /// Effects of the kept candidates, without repetition.
@@ -27,7 +27,7 @@ impl SpecimenReport {
         let of = |effect: &str| {
             self.parameters
                 .iter()
-                .filter(|n| (effect == relaxation(&[]).info().id) == n.name.starts_with("terms."))
+                .filter(|n| (effect == StressRelaxation::ID) == n.name.starts_with("terms."))
                 .map(|n| (n.name.clone(), Estimate { value: n.mean, low: n.low, high: n.high }))
                 .collect()
         };
@@ -53,7 +53,10 @@ impl SpecimenReport {
         let mut diagnosis = Diagnosis {
             verdict: if causes.is_empty() { Verdict::None } else { Verdict::Named },
             causes,
-            not_identifiable: unidentifiable_effects(),
+            // Effects that need a retraction or a puncture.
+            not_identifiable: [PowerLawFriction::ID, ShaftSlip::ID, RateDependentPuncture::ID]
+                .map(str::to_owned)
+                .to_vec(),
             gain: Gain {
                 held_out: true,
                 recordings: recordings.iter().map(|r| r.name.clone()).collect(),
@@ -79,14 +82,4 @@ impl SpecimenReport {
         claims::apply(&mut diagnosis, &Context::default());
         diagnosis
     }
-}
-
-/// Effects that need a retraction or a puncture.
-fn unidentifiable_effects() -> Vec<String> {
-    let effects: [AnyEffect; 3] = [
-        PowerLawFriction { exponent: 1.0 }.into(),
-        ShaftSlip::default().into(),
-        RateDependentPuncture { alpha: 0.0 }.into(),
-    ];
-    effects.iter().map(|e| e.info().id.to_owned()).collect()
 }

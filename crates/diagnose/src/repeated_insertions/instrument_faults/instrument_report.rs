@@ -3,7 +3,7 @@
 use crate::diagnosis_json::{Cause, Estimate};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use stylet_tissue::AnyEffect;
+use stylet_tissue::{AnyEffect, Effect};
 
 /// Confidence in a fault that was measured directly, without a tissue model.
 const DETECTION_CONFIDENCE: f64 = 0.99;
@@ -58,6 +58,19 @@ pub struct DetectedFault {
 }
 
 impl DetectedFault {
+    /// A fault with estimates of its first parameters.
+    pub(super) fn new(
+        effect_model: AnyEffect,
+        estimates: impl IntoIterator<Item = Estimate>,
+        max_force_n: f64,
+        evidence: String,
+    ) -> Self {
+        let info = effect_model.info();
+        let paths = info.parameters.iter().map(|p| p.path.to_owned());
+        let (effect, parameters) = (info.id.to_owned(), paths.zip(estimates).collect());
+        Self { effect, parameters, max_force_n, evidence, effect_model: Some(effect_model) }
+    }
+
     /// Whether the recordings are corrected for it; block means remove tones, and drive friction stays.
     pub(crate) fn is_corrected(&self) -> bool {
         let stays =

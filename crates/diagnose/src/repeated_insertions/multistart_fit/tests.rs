@@ -1,6 +1,7 @@
+use super::super::start_values::SLIP_RATE_INDEX;
 use super::{
-    AGREEMENT, MAX_RMS_RATIO, SAME_OPTIMUM, SET_BLOCK_S, SLIP_RATE_INDEX, StartValues, distinct_optima,
-    fit_from, fit_with_noise_updates, move_day_trend_to_rate, set_blocks, start_values, update_scatter,
+    AGREEMENT, MAX_RMS_RATIO, SAME_OPTIMUM, SET_BLOCK_S, StartValues, distinct_optima, fit_from,
+    fit_with_noise_updates, move_day_trend_to_rate, set_blocks, start_values, update_scatter,
     with_initial_noise,
 };
 use crate::repeated_insertions::SegmentedRecording;

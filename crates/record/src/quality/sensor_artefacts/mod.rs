@@ -26,6 +26,14 @@ pub struct SensorArtefacts {
     pub spikes: Option<Spikes>,
 }
 
+impl SensorArtefacts {
+    /// Standard deviation (N) of the rounding of the recorded force.
+    #[must_use]
+    pub fn quantisation_sd_n(&self) -> f64 {
+        self.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD
+    }
+}
+
 /// Finds range, resolution and spikes of the sensor from the forces of recordings with these quality notes.
 #[must_use]
 pub fn find_sensor_artefacts(recordings: &[&Recording], notes: &[Vec<QualityNote>]) -> SensorArtefacts {
