@@ -4,7 +4,7 @@
 //! [`Diagnosis::findings`], and agreement, verdict and confidences that do not contradict them.
 
 use crate::base_law_fit::MAX_REPLAYS;
-use crate::check_json::Light;
+use crate::check_json::Rating;
 use crate::diagnosis_json::{
     BaseParameter, Diagnosis, Finding, FindingKind, Gain, ResidualStructureReport, Verdict,
 };
@@ -83,7 +83,7 @@ fn findings(d: &Diagnosis, context: &Context) -> Vec<Finding> {
     let mut add = |kind: FindingKind, message: Option<String>| {
         out.extend(message.map(|message| Finding { kind, message }));
     };
-    for item in d.check.iter().filter(|item| item.light == Light::Unusable) {
+    for item in d.check.iter().filter(|item| item.light == Rating::Unusable) {
         let message = format!("diagnosed although it means nothing: {}", item.message);
         add(FindingKind::Unusable, Some(message));
     }
@@ -286,7 +286,7 @@ fn duration(r: &Recording) -> f64 {
 }
 
 fn range(x: &[f64]) -> f64 {
-    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    let (low, high) = stylet_stats::extremes(x);
     (high - low).max(0.0)
 }
 

@@ -1,7 +1,7 @@
 //! Diagnoses recordings: identifies the effects that the scenario lacks, with intervals and the improvement on held-out recordings.
 
 use crate::base_law_fit::{PreparedRecordings, ReplayCount, assumptions_of, fit_base_law};
-use crate::check_json::{CheckItem, Light};
+use crate::check_json::{CheckItem, Rating};
 use crate::claims::{self, Context, have_one_motion};
 use crate::competing_effects::{CompetingEffect, find_competing_effects};
 use crate::diagnosis_json::*;
@@ -33,10 +33,10 @@ use std::sync::Arc;
 use stylet_identify::block_averages::BLOCK_S;
 use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::FitData;
+use stylet_identify::model::Model;
 use stylet_record::sensor_artefacts::SensorArtefacts;
 use stylet_record::{QualityKind, Recording};
 use stylet_scenario::Scenario;
-use stylet_stats::parallel::*;
 use stylet_tissue::{AnyEffect, Effect};
 
 /// Options of a diagnosis.
@@ -79,7 +79,7 @@ pub(crate) fn diagnose_given_layers(
     let force_ratios = match check_recordings(scenario, recordings) {
         Ok(ratios) => ratios,
         Err(why) if options.force && why.is_implausible() => {
-            check.push(CheckItem::new("recordings", Light::Unusable, why.to_string()));
+            check.push(CheckItem::new("recordings", Rating::Unusable, why.to_string()));
             vec![None; recordings.len()]
         }
         Err(why) => return Err(why),
@@ -88,7 +88,7 @@ pub(crate) fn diagnose_given_layers(
     if !options.brief {
         check.extend(check_before_fit(scenario, recordings, &clean, &notes));
         let unusable: Vec<&str> =
-            check.iter().filter(|i| i.light == Light::Unusable).map(|i| i.message.as_str()).collect();
+            check.iter().filter(|i| i.light == Rating::Unusable).map(|i| i.message.as_str()).collect();
         if !unusable.is_empty() && !options.force {
             return Err(DiagnoseError::Unusable { reasons: unusable.join("; ") });
         }
@@ -177,11 +177,8 @@ pub(crate) fn diagnose_given_layers(
     mark_mains(&mut causes, &search);
     let has_cause = has_cause(&search, &causes);
     // Without an identified effect the base law is the final model, unless the best model predicts better despite an unmodelled force.
-    let partial = if assessment.unknown {
-        partial_model(&search, &base_held_out, &extended_held_out, noise_n)
-    } else {
-        None
-    };
+    let partial =
+        partial_model(&search, &base_held_out, &extended_held_out, noise_n).filter(|_| assessment.unknown);
     let extended_held_out =
         if has_cause || partial.is_some() { extended_held_out } else { base_held_out.clone() };
     let verdict = if assessment.unknown {
@@ -245,7 +242,7 @@ pub(crate) fn diagnose_given_layers(
         data_quality,
         search_steps: search.stages.iter().map(search_step).collect(),
         noise: NoiseReport { sd_n: noise_n, ar: autoregression(&search), from_air: false },
-        random_effect_sd: random_effect_sd(&search),
+        random_effect_sd: random_effect_sd(&search.best.model),
         causes,
         ..Diagnosis::default()
     };
@@ -339,9 +336,9 @@ fn errors_per_recording_n(
     })
 }
 
-/// Standard deviations of the random effects of the best model.
-fn random_effect_sd(search: &Search) -> RandomEffectSd {
-    let (s, free) = (&search.best.model.scatter, &search.best.model.free);
+/// Standard deviations of the random effects of a model.
+pub(crate) fn random_effect_sd(model: &Model) -> RandomEffectSd {
+    let (s, free) = (&model.scatter, &model.free);
     RandomEffectSd {
         puncture: s.rupture_force,
         rupture_depth_m: s.rupture_depth_m,

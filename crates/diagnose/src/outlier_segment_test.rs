@@ -38,8 +38,7 @@ pub fn outlier_segment_p_value(data: &FitData, e: &[Vec<f64>]) -> Option<f64> {
     let typical = (median(&mut sizes) * stylet_stats::MAD_TO_SD).max(MIN_NOISE_RATIO / MIN_TYPICAL_RATIO);
     // Smallest mean of a segment, relative to the typical one.
     let least = |w: &[f64]| {
-        let (low, high) =
-            w.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |r, m| (r.0.min(*m), r.1.max(*m)));
+        let (low, high) = stylet_stats::extremes(w);
         if w.iter().all(|m| m.is_finite()) { low.max(-high) / typical } else { 0.0 }
     };
     let most = means.iter().flat_map(|m| m.windows(SEGMENT_WINDOWS)).map(least).fold(0.0, f64::max);

@@ -170,7 +170,7 @@ pub fn predict(
         Some(refit.ok_or(DiagnoseError::NoFit)?)
     };
     let before = assumed.map(|b| Model::base(std::sync::Arc::new(assumptions_of(b)), all.len()));
-    let each: Vec<_> = (0..n)
+    let each: Option<Vec<_>> = (0..n)
         .into_par_iter()
         .map(|r| {
             predicted_recording::predict_one(
@@ -182,14 +182,9 @@ pub fn predict(
             )
         })
         .collect();
-    let (mut recordings, mut curves) = (Vec::with_capacity(n), Vec::with_capacity(n));
-    let mut sums = Vec::with_capacity(n);
-    for found in each {
-        let (predicted, shown, sum) = found.ok_or(DiagnoseError::NoFit)?;
-        recordings.push(predicted);
-        curves.push(shown);
-        sums.push(sum);
-    }
+    let each = each.ok_or(DiagnoseError::NoFit)?;
+    let sums: Vec<ErrorSums> = each.iter().map(|(_, _, sums)| *sums).collect();
+    let (recordings, curves) = each.into_iter().map(|(predicted, shown, _)| (predicted, shown)).unzip();
     let total = sums.iter().fold(ErrorSums::default(), |all, one| all.plus(one));
     let blocks = total.blocks.max(1.0);
     let prediction = Prediction {

@@ -24,7 +24,8 @@ pub struct RecordingPrediction {
     /// Largest measured minus largest predicted force, in N.
     pub peak_error_n: f64,
     /// Whether it is a training recording.
-    pub made_the_law: bool,
+    #[serde(rename = "made_the_law")]
+    pub is_training_recording: bool,
     /// Offset of the sensor's zero in N, which was subtracted; `None` if it is negligible.
     #[serde(default)]
     pub zero_offset_n: Option<f64>,
@@ -159,7 +160,7 @@ pub fn predict_one(
         assumed_rmse_n: was.as_ref().map(|_| (sums.before / count).sqrt()),
         band_coverage: sums.inside / count,
         peak_error_n: peak(&b.force_n) - peak(&predicted_n),
-        made_the_law: target.training_index.is_some(),
+        is_training_recording: target.training_index.is_some(),
         zero_offset_n: prepared.zero_offset_n[r],
         surface_shift_m: is_fitted(0).then_some(deviation[0]),
         force_factor: factor(1),

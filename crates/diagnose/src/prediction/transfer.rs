@@ -37,7 +37,8 @@ pub enum TransferVerdict {
     /// The groups differ, but the recordings do not show in which parameter.
     Ambiguous,
     /// The new group follows another law.
-    AnotherLaw,
+    #[serde(rename = "another_law")]
+    AnotherModel,
 }
 
 /// Difference of the new group in one parameter.
@@ -67,7 +68,8 @@ pub struct RecordingTransfer {
     /// RMS error (N) of the updated model.
     pub after_n: f64,
     /// Whether the model was fitted to it.
-    pub made_the_law: bool,
+    #[serde(rename = "made_the_law")]
+    pub is_training_recording: bool,
     /// Offset of the sensor's zero in N, which was subtracted; `None` if it is negligible.
     #[serde(default)]
     pub zero_offset_n: Option<f64>,
@@ -175,7 +177,7 @@ pub fn compare_groups(
                 name: prepared.names[*r].clone(),
                 before_n: rms_n(&[*r], [0.0; PARAMETERS])?,
                 after_n: rms_n(&[*r], group.full_mean)?,
-                made_the_law: targets[*r].training_index.is_some(),
+                is_training_recording: targets[*r].training_index.is_some(),
                 zero_offset_n: prepared.zero_offset_n[*r],
             })
         })
@@ -183,7 +185,7 @@ pub fn compare_groups(
     let own_n = fit.own_rms_n().ok_or(DiagnoseError::NoFit)?;
     let misfit_ratio = own_n / model_n;
     let verdict = if misfit_ratio > MAX_MISFIT_RATIO {
-        TransferVerdict::AnotherLaw
+        TransferVerdict::AnotherModel
     } else if (0..PARAMETERS).any(differs) {
         TransferVerdict::Differs
     } else if difference.probability_of_none < DIFFERENCE_PROBABILITY {

@@ -4,8 +4,7 @@ use super::ablation::ModelTerm;
 use super::cross_validation::{HeldOutPrediction, leave_one_out, leave_speed_out, repeatability_floor};
 use super::data_quality_notes::data_quality;
 use super::held_out_loss::paired_confidence;
-use super::instrument_faults::CalibratedRecordings;
-use super::instrument_faults::{InstrumentReport, ReferenceRecordings};
+use super::instrument_faults::{CalibratedRecordings, InstrumentReport, ReferenceRecordings};
 use super::mean_scenario::mean_scenario;
 use super::model_selection::{CandidateModels, select_model};
 use super::nested_cross_validation::nested_cross_validation;
@@ -16,8 +15,9 @@ use super::repeatability_report::{
 use super::scored_model::{ModelFamily, ScoredModel, active_effects};
 use super::segmented_recording::{SegmentedRecording, have_several_speeds};
 use crate::claims::{self, Context, SIGNIFICANT_P_VALUE};
+use crate::diagnose::random_effect_sd;
 use crate::diagnosis_json::{
-    Cause, Diagnosis, Estimate, Gain, NegligibleEffect, NoiseReport, RandomEffectSd, ResidualStructureReport,
+    Cause, Diagnosis, Estimate, Gain, NegligibleEffect, NoiseReport, ResidualStructureReport,
     SearchCandidate, SearchStep, Verdict,
 };
 use crate::model_grade::grade;
@@ -133,16 +133,15 @@ pub fn diagnose_set(
     })
 }
 
-/// Leave-one-out predictions of the base law; `best` are those of the best model.
+/// Leave-one-out predictions of the base law; `held_out` are those of the best model.
 fn base_predictions(
     candidates: &CandidateModels,
     held_out: &[HeldOutPrediction],
     recordings: &[&SegmentedRecording],
 ) -> Vec<HeldOutPrediction> {
-    if candidates.best.family == ModelFamily::Base {
-        held_out.to_vec()
-    } else {
-        leave_one_out(&candidates.base.set_fit, recordings)
+    match candidates.best.family {
+        ModelFamily::Base => held_out.to_vec(),
+        _ => leave_one_out(&candidates.base.set_fit, recordings),
     }
 }
 
@@ -191,7 +190,8 @@ fn diagnosis(
                 ShaftSlip::ID => &candidates.base.errors_n[..],
                 _ => term.map_or(&[][..], |p| &p.without_n),
             };
-            cause(id, &estimates, without, best, &candidates.base)
+            let confidence = paired_confidence(without, &best.errors_n);
+            cause(id, &estimates, confidence, without, best, &candidates.base)
         })
         .collect();
     causes.sort_by(|a, b| b.share.total_cmp(&a.share));
@@ -213,7 +213,6 @@ fn diagnosis(
         (false, true) => Verdict::None,
         (false, false) => Verdict::Named,
     };
-    let scatter = &model.scatter;
     let mut diagnosis = Diagnosis {
         verdict,
         causes,
@@ -242,12 +241,7 @@ fn diagnosis(
             ar: [repeats.instrument.ar1.unwrap_or(0.0), 0.0],
             from_air: repeats.instrument.noise_n.is_some(),
         },
-        random_effect_sd: RandomEffectSd {
-            puncture: scatter.rupture_force,
-            rupture_depth_m: scatter.rupture_depth_m,
-            surface_m: scatter.surface_m,
-            friction: scatter.ln_friction,
-        },
+        random_effect_sd: random_effect_sd(model),
         advice: advice(best, &estimates),
         ..Diagnosis::default()
     };
@@ -298,6 +292,7 @@ fn unidentified_effects(best: &ScoredModel, recordings: &[&SegmentedRecording]) 
 fn cause(
     id: &str,
     estimates: &[ParameterEstimate],
+    confidence: f64,
     without: &[f64],
     best: &ScoredModel,
     base: &ScoredModel,
@@ -311,7 +306,7 @@ fn cause(
     let share = (square(without) - square(&best.errors_n)) / explained;
     Cause {
         effect: id.to_owned(),
-        confidence: paired_confidence(without, &best.errors_n),
+        confidence,
         parameters,
         gain_nats: (base.set_fit.fit.nats() - best.set_fit.fit.nats()).max(0.0),
         share: if share.is_finite() { share.clamp(0.0, 1.0) } else { 1.0 },

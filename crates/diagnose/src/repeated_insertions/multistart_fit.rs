@@ -26,9 +26,9 @@ const INITIAL_NOISE_SHARE: f64 = 0.1;
 /// Weight of the prior scatter between days, in days.
 pub(super) const PRIOR_DAYS: f64 = 4.0;
 /// Iterations of the screening fits, per noise update.
-const SCREENING_TURNS: [usize; 2] = [6, 6];
+const SCREENING_ITERATIONS: [usize; 2] = [6, 6];
 /// Iterations of the fits that continue, per noise update.
-const CONTINUED_TURNS: [usize; 2] = [6, 8];
+const CONTINUED_ITERATIONS: [usize; 2] = [6, 8];
 /// Number of starts that continue after screening.
 const CONTINUED_STARTS: usize = 8;
 /// Largest number of distinct optima that are refined.
@@ -119,33 +119,29 @@ fn start_values(k: usize, rng: &mut ChaCha8Rng) -> StartValues {
     }
 }
 
-/// Fits in rounds; before each, noise, rupture times and scatter are updated from the previous fit.
+/// Fits in rounds; before each but the first, noise, rupture times and scatter are updated from the previous fit. The data returned have the
+/// noise of the last one.
 pub(crate) fn fit_with_noise_updates(
     model: &Model,
-    data: FitData,
+    mut data: FitData,
     drops: &[Vec<f64>],
     rounds: &[usize],
 ) -> Option<(Fit, FitData)> {
-    let mut data = data;
     let mut best: Option<Fit> = None;
     for iterations in rounds {
         let mut from = best.as_ref().map_or(model, |b| &b.model).clone();
         move_day_trend_to_rate(&mut from, &data);
         if let Some(best) = &best {
-            data = data.with_noise(discrepancy_noise(
-                &data.recordings,
-                &best.residuals.residual_n,
-                data.floor_n,
-            ));
             update_event_times(&mut from, &data, drops);
             update_scatter(&mut from, &data, best);
         }
-        best =
-            Some(fit_nonsmooth(&from, &data, Effort { max_iterations: *iterations, min_gain_nats: 0.05 })?);
+        let effort = Effort { max_iterations: *iterations, min_gain_nats: 0.05 };
+        let fitted = fit_nonsmooth(&from, &data, effort)?;
+        data =
+            data.with_noise(discrepancy_noise(&data.recordings, &fitted.residuals.residual_n, data.floor_n));
+        best = Some(fitted);
     }
-    let best = best?;
-    data = data.with_noise(discrepancy_noise(&data.recordings, &best.residuals.residual_n, data.floor_n));
-    Some((best, data))
+    Some((best?, data))
 }
 
 /// Logarithm of the advance speed (mm/s).
@@ -295,10 +291,10 @@ pub fn multistart_fit(
         recordings.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect()).collect();
     let coarse = with_initial_noise(fine.iter().map(|b| b.coarsened(COARSENING_FACTOR)).collect());
     // Most starts are dropped after screening.
-    let mut found = fit_all(starts, &coarse, &drops, &SCREENING_TURNS);
+    let mut found = fit_all(starts, &coarse, &drops, &SCREENING_ITERATIONS);
     found.truncate(CONTINUED_STARTS);
     let promising: Vec<Model> = found.into_iter().map(|f| f.1).collect();
-    let found = fit_all(&promising, &coarse, &drops, &CONTINUED_TURNS);
+    let found = fit_all(&promising, &coarse, &drops, &CONTINUED_ITERATIONS);
     let errors: Vec<f64> = found.iter().map(|f| f.0).collect();
     let (agree, apart) = distinct_optima(&errors);
     let whole = with_initial_noise(fine);

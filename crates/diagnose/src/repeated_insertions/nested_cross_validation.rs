@@ -8,7 +8,7 @@ use super::cross_validation::{refit_without, training_recordings};
 use super::model_selection::{CandidateModels, best_candidate};
 use super::random_effects_population::Population;
 use super::scored_model::{
-    REFIT_TURNS, ScoredModel, active_effects, folds, predict_fold, with_coarse_blocks,
+    REFIT_ITERATIONS, ScoredModel, active_effects, folds, predict_fold, with_coarse_blocks,
 };
 use super::segmented_recording::SegmentedRecording;
 use serde::Serialize;
@@ -36,7 +36,7 @@ pub fn nested_cross_validation(
         let of = |candidate: &ScoredModel| {
             Some(ScoredModel::new(
                 candidate.family,
-                refit_without(&with_coarse_blocks(&candidate.set_fit), &fold, &[REFIT_TURNS])?,
+                refit_without(&with_coarse_blocks(&candidate.set_fit), &fold, &[REFIT_ITERATIONS])?,
                 &some,
             ))
         };

@@ -50,24 +50,11 @@ fn parameter_values(model: &Model) -> Vec<(String, String, f64, bool)> {
     push("layer.0".to_owned(), "surface_m", model.tissue.surface_m, reached(ParameterRole::Surface));
     for (l, layer) in model.tissue.layers.iter().enumerate() {
         let owner = format!("layer.{}", l + 1);
-        push(
-            owner.clone(),
-            "front_m",
-            model.tissue.front_m(l),
-            l > 0 && reached(ParameterRole::Thickness(l - 1)),
-        );
-        push(
-            owner.clone(),
-            "stiffness_n_per_m",
-            layer.stiffness_n_per_m,
-            reached(ParameterRole::Stiffness(l)),
-        );
-        push(
-            owner.clone(),
-            "friction_ns_per_m2",
-            layer.friction_ns_per_m2,
-            reached(ParameterRole::Friction(l)),
-        );
+        let is_front_at_bound = l > 0 && reached(ParameterRole::Thickness(l - 1));
+        push(owner.clone(), "front_m", model.tissue.front_m(l), is_front_at_bound);
+        let (stiffness, friction) = (layer.stiffness_n_per_m, layer.friction_ns_per_m2);
+        push(owner.clone(), "stiffness_n_per_m", stiffness, reached(ParameterRole::Stiffness(l)));
+        push(owner.clone(), "friction_ns_per_m2", friction, reached(ParameterRole::Friction(l)));
         if let Some(force) = layer.puncture_n {
             push(owner, "puncture_n", force, reached(ParameterRole::Puncture(l)));
         }

@@ -16,7 +16,7 @@ const FOLDS: usize = 3;
 /// Largest number of recordings that are held out one by one.
 const LEAVE_ONE_OUT_LIMIT: usize = 8;
 /// Iterations of a refit in cross-validation.
-pub(super) const REFIT_TURNS: usize = 5;
+pub(super) const REFIT_ITERATIONS: usize = 5;
 /// Draws of a prediction in cross-validation.
 const DRAWS: usize = 16;
 
@@ -121,7 +121,9 @@ fn held_out_scores(
     let done: Vec<Vec<(usize, PredictionScore)>> = parts
         .par_iter()
         .map(|part| {
-            let Some(p) = population_without(at, recordings, part, &[REFIT_TURNS]) else { return Vec::new() };
+            let Some(p) = population_without(at, recordings, part, &[REFIT_ITERATIONS]) else {
+                return Vec::new();
+            };
             predict_fold(&p, day_of, recordings, part)
         })
         .collect();

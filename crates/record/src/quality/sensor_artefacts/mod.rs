@@ -93,6 +93,13 @@ mod tests {
         }
     }
 
+    #[test]
+    fn quantisation_noise_is_uniform_over_one_step() {
+        let noise_n = SensorArtefacts { step_n: Some(0.6), ..SensorArtefacts::default() }.quantisation_sd_n();
+        assert!((noise_n / (0.6 / 12.0_f64.sqrt()) - 1.0).abs() < 2e-3, "{noise_n}");
+        assert_eq!(SensorArtefacts::default().quantisation_sd_n(), 0.0);
+    }
+
     /// Samples that alternate by `d` about zero differ from their neighbours by `d`: the scatter is 1.4826 `d`.
     pub(in crate::quality::sensor_artefacts) fn alternating(n: usize, d: f64) -> Vec<f64> {
         (0..n).map(|k| if k % 2 == 0 { d } else { -d }).collect()
