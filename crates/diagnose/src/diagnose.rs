@@ -177,8 +177,8 @@ pub(crate) fn diagnose_given_layers(
     mark_mains(&mut causes, &search);
     let has_cause = has_cause(&search, &causes);
     // Without an identified effect the base law is the final model, unless the best model predicts better despite an unmodelled force.
-    let partial =
-        partial_model(&search, &base_held_out, &extended_held_out, noise_n).filter(|_| assessment.unknown);
+    let partial_model = || partial_model(&search, &base_held_out, &extended_held_out, noise_n);
+    let partial = assessment.unknown.then(partial_model).flatten();
     let extended_held_out =
         if has_cause || partial.is_some() { extended_held_out } else { base_held_out.clone() };
     let verdict = if assessment.unknown {
