@@ -281,7 +281,7 @@ fn the_band_of_a_model_holds_the_recordings_that_made_it_and_a_refit_moves_nothi
     );
     let own = run(&none, made);
     println!("{own:?}");
-    assert!(own.varying.is_empty() && own.recordings.iter().all(|r| r.made_the_law), "{own:?}");
+    assert!(own.varying.is_empty() && own.recordings.iter().all(|r| r.is_training_recording), "{own:?}");
     assert!((0.85..=0.97).contains(&own.band_coverage), "{own:?}");
     let refitted = run(&all, made);
     assert!(!refitted.refit.as_ref().expect("a refit").moved, "{refitted:?}");

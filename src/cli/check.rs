@@ -5,7 +5,7 @@ use crate::cli::exit_codes::Failure;
 use std::fmt::Write as _;
 use stylet_api::output_folder::check_folder;
 use stylet_api::resource_estimate;
-use stylet_diagnose::check_json::Light;
+use stylet_diagnose::check_json::Rating;
 use stylet_diagnose::experiment_check::ExperimentCheck;
 use stylet_report::pages::experiment_check::summary_sentence;
 
@@ -28,7 +28,7 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
     let report = stylet_api::check(&scenario, &inputs.read_recordings()?)?;
     let output = report.output.with_inputs(read);
     args.results.write_and_print(&folder, &output, || text(&report.check))?;
-    let unusable = report.check.items.iter().find(|item| item.light == Light::Unusable);
+    let unusable = report.check.items.iter().find(|item| item.light == Rating::Unusable);
     unusable.map_or(Ok(()), |item| Err(Failure::Unusable(item.message.clone())))
 }
 

@@ -74,15 +74,13 @@ impl PreparedRecordings {
 
     /// Whether the search for effects has reached its limit. To be asked between fits that run one after another, so that
     /// the answer is the same for any number of threads.
-    #[must_use]
-    pub fn is_search_limit_reached(&self) -> bool {
+    pub(crate) fn is_search_limit_reached(&self) -> bool {
         let blocks: usize = self.blocks.iter().map(BlockAverages::len).sum();
         self.replayed.load(Ordering::Relaxed) > self.max_replays.saturating_mul(blocks as u64)
     }
 
     /// The same recordings with these steps of the sensor zero, which are subtracted before force drops are detected again.
-    #[must_use]
-    pub fn with_zero_steps(&self, zero_steps: Vec<Vec<ZeroStep>>) -> Self {
+    pub(crate) fn with_zero_steps(&self, zero_steps: Vec<Vec<ZeroStep>>) -> Self {
         let without_steps = |(b, steps): (&BlockAverages, &Vec<ZeroStep>)| {
             let mut force_n = b.force_n.clone();
             steps.iter().for_each(|s| s.add_to(&b.start_s, &b.end_s, &mut force_n, -1.0));
@@ -96,8 +94,7 @@ impl PreparedRecordings {
     }
 
     /// Times (s) of the drops of each recording.
-    #[must_use]
-    pub fn drop_times(&self) -> Vec<Vec<f64>> {
+    pub(crate) fn drop_times(&self) -> Vec<Vec<f64>> {
         self.drops.iter().map(|d| d.iter().map(|d| d.time_s).collect()).collect()
     }
 
@@ -108,8 +105,7 @@ impl PreparedRecordings {
     }
 
     /// Largest force in N.
-    #[must_use]
-    pub fn largest_force_n(&self) -> f64 {
+    pub(crate) fn largest_force_n(&self) -> f64 {
         self.blocks.iter().flat_map(|b| &b.abs_force_n).fold(1e-9, |m: f64, f| m.max(*f))
     }
 }
@@ -181,8 +177,7 @@ pub fn fit_base_law(prepared: &PreparedRecordings) -> Option<(Fit, FitData)> {
 ///
 /// The base law mistakes drops that an effect produces for ruptures and shifts its layers; a fit that starts from there stays in that local
 /// minimum.
-#[must_use]
-pub fn refit_from_prior(
+pub(crate) fn refit_from_prior(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
     random_effects: RandomEffects,
@@ -193,8 +188,7 @@ pub fn refit_from_prior(
 }
 
 /// As [`refit_from_prior`], on coarser blocks (`coarse`) and with fewer steps, to decide whether a full refit can help.
-#[must_use]
-pub fn coarse_refit(
+pub(crate) fn coarse_refit(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
     random_effects: RandomEffects,
@@ -210,18 +204,9 @@ pub fn coarse_refit(
     fit(&with_updated_times(model, coarse, &prepared.drop_times()), coarse, COARSE_EFFORT)
 }
 
-/// Fits the base law with baseline effects from the prior; returns the fit and the data with the noise estimated from it.
-pub(crate) fn fit_with_baseline(
-    prepared: &PreparedRecordings,
-    effects: &[EffectTerm],
-) -> Option<(Fit, FitData)> {
-    fit_from_prior(prepared, effects, (false, false))
-}
-
 /// Refits the base law with a surface position and a friction factor per recording. The refit is kept if it reduces the objective so
 /// strongly that the first fit must have mistaken differences between recordings for ruptures.
-#[must_use]
-pub fn refit_with_random_effects(
+pub(crate) fn refit_with_random_effects(
     prepared: &PreparedRecordings,
     base_fit: Fit,
     data: FitData,
@@ -231,9 +216,7 @@ pub fn refit_with_random_effects(
         if data.recording_count() < 2 || base_fit.rms_n(&data) < MISFIT_FACTOR * calm_data.noise.sd_n() {
             return None;
         }
-        let coarse = data
-            .with_recordings(data.recordings.par_iter().map(|b| b.coarsened(COARSENING_FACTOR)).collect());
-        let coarse = with_noise_of(&base_fit.model, &coarse)?;
+        let coarse = with_noise_of(&base_fit.model, &data.coarsened(COARSENING_FACTOR))?;
         let current = residuals(&base_fit.model, &coarse)?.nats;
         let coarse_fit = coarse_refit(prepared, &[], (true, true), &coarse)?;
         if coarse_fit.nats() > MAX_OBJECTIVE_SHARE * current {
@@ -285,7 +268,7 @@ fn fit_with_assigned_drops(
 }
 
 /// Fit from the prior: assigned drops, then rounds in which noise, rupture times and parameters are updated.
-fn fit_from_prior(
+pub(crate) fn fit_from_prior(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
     random_effects: RandomEffects,

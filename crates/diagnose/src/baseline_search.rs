@@ -4,9 +4,10 @@
 //! shifts the surface, and a search from there stays in that local minimum. If one effect leaves structure, the search therefore also starts
 //! from the base law with the baseline terms whose gain exceeds their BIC penalty; the better of both searches is kept.
 
-use crate::base_law_fit::{PreparedRecordings, fit_with_baseline, leaves_noise};
+use crate::base_law_fit::{PreparedRecordings, fit_from_prior, leaves_noise};
 use crate::effect_selection::{MAX_EFFECTS, Search, SearchStage};
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
+use crate::model_pruning::required_gain_nats;
 use crate::random_effect_selection::select_random_effects;
 use crate::zero_steps::{
     remove_weak_steps, toggled, unassigned, with_steps_in_residual, zero_step_candidates,
@@ -114,11 +115,10 @@ impl EffectSearch {
 
     /// The other search if its penalised likelihood is better.
     fn or_better(self, other: Self) -> Self {
-        let penalty =
-            |s: &Search| bic_penalty(s.best.model.effect_parameter_count(), s.data.compared_block_count());
+        let penalty = |s: &Search| s.penalty_of(&s.best.model);
         let needed = penalty(&other.search) - penalty(&self.search);
         let gain = likelihood_gain(&self.search.best, &other.search.best, &other.search.data);
-        if gain.exceeds(needed) { other } else { self }
+        if gain > needed { other } else { self }
     }
 }
 
@@ -166,7 +166,7 @@ impl Baseline {
         let terms: Vec<EffectTerm> = infos.iter().map(inactive).collect();
         let fitted = |steps: Vec<Vec<ZeroStep>>| {
             let prepared = prepared.with_zero_steps(steps);
-            let (fit, data) = fit_with_baseline(&prepared, &terms)?;
+            let (fit, data) = fit_from_prior(&prepared, &terms, (false, false))?;
             Some((prepared, fit, data))
         };
         let gain_of = |other: &(PreparedRecordings, Fit, FitData),
@@ -174,7 +174,7 @@ impl Baseline {
             let count = |f: &Fit| f.model.effect_parameter_count() as f64;
             let blocks = other.2.compared_block_count();
             let penalty = (count(&other.1) - count(&best.1)) * bic_penalty(1, blocks);
-            likelihood_gain(&best.1, &other.1, &other.2).value() - penalty
+            likelihood_gain(&best.1, &other.1, &other.2) - penalty
         };
         let rounds = match effort {
             BaselineEffort::Quick => 1,
@@ -231,10 +231,13 @@ impl Baseline {
         let stages = search.prune_baseline();
         let prepared = prepared.with_zero_steps(search.best.model.zero_steps.clone());
         let any = !search.best.model.effects.is_empty() || search.best.model.zero_step_count() > 0;
-        let needed =
-            bic_penalty(search.best.model.effect_parameter_count(), search.data.compared_block_count());
-        (any && likelihood_gain(base, &search.best, &search.data).exceeds(needed + MIN_GAIN_NATS))
-            .then_some(Self { prepared, fit: search.best, data: search.data, stages })
+        let needed = search.penalty_of(&search.best.model) + MIN_GAIN_NATS;
+        (any && likelihood_gain(base, &search.best, &search.data) > needed).then_some(Self {
+            prepared,
+            fit: search.best,
+            data: search.data,
+            stages,
+        })
     }
 }
 
@@ -266,17 +269,15 @@ impl Search {
     fn prune_baseline(&mut self) -> Vec<SearchStage> {
         loop {
             remove_weak_steps(self, NoiseSource::Residual);
-            let blocks = self.data.compared_block_count();
             let tried: Vec<(usize, Fit)> = (0..self.best.model.effects.len())
                 .into_par_iter()
                 .filter_map(|k| Some((k, fit(&self.best.model.without_effect(k), &self.data, Effort::FULL)?)))
                 .collect();
-            let count = |f: &Fit| f.model.effect_parameter_count();
             let gains: Vec<(usize, f64, f64, Fit)> = tried
                 .into_par_iter()
                 .map(|(k, f)| {
-                    let needed = bic_penalty(count(&self.best) - count(&f), blocks) + MIN_GAIN_NATS;
-                    (k, likelihood_gain(&f, &self.best, &self.data).value(), needed, f)
+                    let needed = required_gain_nats(&f, &self.best, &self.data);
+                    (k, likelihood_gain(&f, &self.best, &self.data), needed, f)
                 })
                 .collect();
             let weakest = gains.iter().min_by(|a, b| (a.1 - a.2).total_cmp(&(b.1 - b.2)));

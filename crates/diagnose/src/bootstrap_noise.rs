@@ -28,14 +28,13 @@ fn under_noise(columns: &[RecordingColumn], matrix: &SymmetricMatrix, data: &Fit
 }
 
 /// Information matrices under bootstrap estimates of the noise; `matrix` is the one under the noise of `data`.
-#[must_use]
 pub fn bootstrap_noise(
-    tangent: &Linearization,
+    linearization: &Linearization,
     data: &FitData,
     matrix: &SymmetricMatrix,
     rng: &mut impl Rng,
 ) -> Vec<SymmetricMatrix> {
-    let columns = recording_columns(tangent, data);
+    let columns = recording_columns(linearization, data);
     let factor = matrix.cholesky();
     let drawn: Vec<Vec<Vec<f64>>> = (0..REPLICATES)
         .map(|_| {
@@ -72,12 +71,12 @@ struct RecordingColumn {
 }
 
 /// Non-zero Jacobian columns of each recording.
-fn recording_columns(tangent: &Linearization, data: &FitData) -> Vec<RecordingColumn> {
-    let shared = tangent.shared.len();
+fn recording_columns(linearization: &Linearization, data: &FitData) -> Vec<RecordingColumn> {
+    let shared = linearization.shared.len();
     let mut out = Vec::new();
     for recording in 0..data.recording_count() {
-        for (k, column) in tangent.columns.iter().enumerate() {
-            let at = if k < shared { k } else { tangent.index_of(k - shared, recording) };
+        for (k, column) in linearization.columns.iter().enumerate() {
+            let at = if k < shared { k } else { linearization.index_of(k - shared, recording) };
             let Some(w) = column.innovations.get(recording).filter(|w| w.iter().any(|x| *x != 0.0)) else {
                 continue;
             };

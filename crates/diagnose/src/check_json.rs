@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 /// Suitability of recordings for a diagnosis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Light {
+pub enum Rating {
     /// Good enough for a diagnosis.
     Good,
     /// A diagnosis will be limited.
@@ -15,14 +15,14 @@ pub enum Light {
     Unusable,
 }
 
-impl Light {
+impl Rating {
     /// Name as printed by the command and the report.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Light::Good => "good",
-            Light::Limited => "limited",
-            Light::Unusable => "unusable",
+            Rating::Good => "good",
+            Rating::Limited => "limited",
+            Rating::Unusable => "unusable",
         }
     }
 }
@@ -33,13 +33,13 @@ pub struct CheckItem {
     /// Aspect: `recordings`, `contact`, `motion`, `depth`, `parameters` or `effects`.
     pub topic: String,
     /// Suitability of the recordings in this aspect.
-    pub light: Light,
+    pub light: Rating,
     /// The reason, in one sentence.
     pub message: String,
 }
 
 impl CheckItem {
-    pub(crate) fn new(topic: &str, light: Light, message: String) -> Self {
+    pub(crate) fn new(topic: &str, light: Rating, message: String) -> Self {
         Self { topic: topic.to_owned(), light, message }
     }
 }

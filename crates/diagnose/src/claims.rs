@@ -4,8 +4,10 @@
 //! [`Diagnosis::findings`], and agreement, verdict and confidences that do not contradict them.
 
 use crate::base_law_fit::MAX_REPLAYS;
-use crate::check_json::Light;
-use crate::diagnosis_json::{BaseParameter, Diagnosis, Finding, FindingKind, Gain, Verdict};
+use crate::check_json::Rating;
+use crate::diagnosis_json::{
+    BaseParameter, Diagnosis, Finding, FindingKind, Gain, ResidualStructureReport, Verdict,
+};
 use stylet_record::{QualityKind, Recording};
 use stylet_scenario::Scenario;
 use stylet_stats::number_format::{p_value, significant};
@@ -78,49 +80,29 @@ fn max_confidence(findings: &[Finding]) -> f64 {
 
 fn findings(d: &Diagnosis, context: &Context) -> Vec<Finding> {
     let mut out = Vec::new();
-    let mut add = |kind: FindingKind, message: String| out.push(Finding { kind, message });
-    for item in d.check.iter().filter(|item| item.light == Light::Unusable) {
-        add(FindingKind::Unusable, format!("diagnosed although it means nothing: {}", item.message));
+    let mut add = |kind: FindingKind, message: Option<String>| {
+        out.extend(message.map(|message| Finding { kind, message }));
+    };
+    for item in d.check.iter().filter(|item| item.light == Rating::Unusable) {
+        let message = format!("diagnosed although it means nothing: {}", item.message);
+        add(FindingKind::Unusable, Some(message));
     }
     for b in d.base_parameters.iter().filter(|b| b.out_of_tolerance) {
-        add(FindingKind::OutOfTolerance, out_of_tolerance(b));
+        add(FindingKind::OutOfTolerance, Some(out_of_tolerance(b)));
     }
-    if let Some(message) = prediction_error(&d.gain, context.resolution_n) {
-        add(FindingKind::PredictionError, message);
-    }
-    let structure = &d.residual_structure;
-    if structure.p_value < SIGNIFICANT_P_VALUE {
-        let on = structure.depends_on.join(", ");
-        add(
-            FindingKind::ResidualStructure,
-            format!("the residual depends on {on} ({})", p_value(structure.p_value)),
-        );
-    }
-    let bounds = parameters_at_bound(d);
-    if !bounds.is_empty() {
-        let stand = if bounds.len() == 1 { "is at its bound" } else { "are at their bounds" };
-        add(
-            FindingKind::AtBound,
-            format!("{} {stand}: the data ask for another value, or do not determine one", bounds.join(", ")),
-        );
-    }
-    if let Some(message) = scatter(d) {
-        add(FindingKind::Scatter, message);
-    }
-    if let Some(message) = noise_level(d.gain.floor_n, context) {
-        add(FindingKind::NoiseLevel, message);
-    }
-    if context.is_search_limit_reached {
-        add(
-            FindingKind::SearchLimit,
-            format!(
-                "the search for effects ended at its limit of {MAX_REPLAYS} replays, a further effect may be missing: diagnose fewer or \
-                 shorter recordings"
-            ),
-        );
-    }
+    add(FindingKind::PredictionError, prediction_error(&d.gain, context.resolution_n));
+    add(FindingKind::ResidualStructure, residual_structure(&d.residual_structure));
+    add(FindingKind::AtBound, parameters_at_bound(d));
+    add(FindingKind::Scatter, scatter(d));
+    add(FindingKind::NoiseLevel, noise_level(d.gain.floor_n, context));
+    let search_limit = format!(
+        "the search for effects ended at its limit of {MAX_REPLAYS} replays, a further effect may be missing: diagnose fewer or shorter \
+        recordings"
+    );
+    add(FindingKind::SearchLimit, context.is_search_limit_reached.then_some(search_limit));
     for q in d.data_quality.iter().filter(|q| q.note.kind == QualityKind::OutlierRecording) {
-        add(FindingKind::OutlierRecording, format!("{} is not like the other recordings", q.recording));
+        let message = format!("{} is not like the other recordings", q.recording);
+        add(FindingKind::OutlierRecording, Some(message));
     }
     let few = match d.gain.recordings.len() {
         1 => Some((FindingKind::OneRecording, "one recording: the model predicted no other")),
@@ -135,7 +117,7 @@ fn findings(d: &Diagnosis, context: &Context) -> Vec<Finding> {
             true => String::new(),
             false => format!(", so no cause has a confidence above {MAX_CONFIDENCE_FEW}"),
         };
-        add(kind, format!("{what}{limit}"));
+        add(kind, Some(format!("{what}{limit}")));
     }
     out
 }
@@ -155,12 +137,23 @@ fn prediction_error(g: &Gain, resolution_n: f64) -> Option<String> {
     })
 }
 
-/// Parameters at their bounds, in words.
-fn parameters_at_bound(d: &Diagnosis) -> Vec<String> {
+/// Finding: a residual that depends on a feature.
+fn residual_structure(structure: &ResidualStructureReport) -> Option<String> {
+    let on = structure.depends_on.join(", ");
+    (structure.p_value < SIGNIFICANT_P_VALUE)
+        .then(|| format!("the residual depends on {on} ({})", p_value(structure.p_value)))
+}
+
+/// Finding: parameters at their bounds.
+fn parameters_at_bound(d: &Diagnosis) -> Option<String> {
     let base = d.base_parameters.iter().filter(|b| b.at_bound && !b.at_least).map(parameter_name);
     let of_causes =
         d.causes.iter().flat_map(|c| c.at_bound.iter().map(|path| format!("{path} of {}", c.effect)));
-    base.chain(of_causes).collect()
+    let all: Vec<String> = base.chain(of_causes).collect();
+    let stand = if all.len() == 1 { "is at its bound" } else { "are at their bounds" };
+    (!all.is_empty()).then(|| {
+        format!("{} {stand}: the data ask for another value, or do not determine one", all.join(", "))
+    })
 }
 
 /// Compares the fitted parameters with the scenario's values and tolerances, even if the fit started from others.
@@ -293,7 +286,7 @@ fn duration(r: &Recording) -> f64 {
 }
 
 fn range(x: &[f64]) -> f64 {
-    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+    let (low, high) = stylet_stats::extremes(x);
     (high - low).max(0.0)
 }
 

@@ -40,11 +40,8 @@ pub fn find_competing_effects(search: &mut Search) -> Vec<Vec<CompetingEffect>> 
         let justified = |f: &Fit| {
             f.model.effect_parameter_count() <= search.best.model.effect_parameter_count()
                 || (!effect_at_bound(f, k)
-                    && likelihood_gain(&search.best, f, &search.data).exceeds(required_gain_nats(
-                        &search.best,
-                        f,
-                        &search.data,
-                    )))
+                    && likelihood_gain(&search.best, f, &search.data)
+                        > required_gain_nats(&search.best, f, &search.data))
         };
         if let Some((f, _)) = ahead.filter(|r| replacements < 3 && justified(&r.0)) {
             search.replace_effect(k, f.clone());

@@ -38,7 +38,7 @@ const INFINITE_FREEDOM: f64 = 1e4;
 /// Covariance of the fitted parameters at an optimum.
 pub struct Covariance<'a> {
     pub(crate) fit: &'a Fit,
-    pub(crate) tangent: Linearization,
+    pub(crate) linearization: Linearization,
     matrix: SymmetricMatrix,
     pub(crate) factor: CholeskyFactor,
     /// Factors with one random-effect variance increased, and the degrees of freedom of that variance.
@@ -58,10 +58,9 @@ enum RandomEffect {
 
 impl<'a> Covariance<'a> {
     /// Covariance including the uncertainty of the estimated noise.
-    #[must_use]
     pub fn new(fit: &'a Fit, data: &FitData, rng: &mut impl Rng) -> Self {
         let mut covariance = Self::with_known_noise(fit, data);
-        covariance.bootstrap = bootstrap_noise(&covariance.tangent, data, &covariance.matrix, rng)
+        covariance.bootstrap = bootstrap_noise(&covariance.linearization, data, &covariance.matrix, rng)
             .iter()
             .map(SymmetricMatrix::cholesky)
             .collect();
@@ -70,10 +69,10 @@ impl<'a> Covariance<'a> {
 
     /// Covariance under known noise.
     pub(crate) fn with_known_noise(fit: &'a Fit, data: &FitData) -> Self {
-        let mut tangent = Linearization::new(&fit.model, data, &fit.residuals);
+        let mut linearization = Linearization::new(&fit.model, data, &fit.residuals);
         let mut wide_m = 0.0;
         for _ in 0..MAX_STEP_UPDATES {
-            let Some(next_m) = boundary_sd_m(&tangent, &fit.model) else { break };
+            let Some(next_m) = boundary_sd_m(&linearization, &fit.model) else { break };
             if (next_m / wide_m - 1.0).abs() < STEP_TOLERANCE {
                 break;
             }
@@ -82,7 +81,7 @@ impl<'a> Covariance<'a> {
             let step = |n: &Parameter| {
                 moves_a_kink(n.role, &fit.model).then_some(wide_m.min(0.25 * (n.high - n.low)))
             };
-            tangent = tangent.with_wide_differences(&fit.model, data, &fit.residuals, &step);
+            linearization = linearization.with_wide_differences(&fit.model, data, &fit.residuals, &step);
         }
         let estimated: Vec<(RandomEffect, f64, f64)> = [
             RandomEffect::Surface,
@@ -94,16 +93,22 @@ impl<'a> Covariance<'a> {
         .filter_map(|kind| degrees_of_freedom(kind, fit).map(|(count, freedom)| (kind, count, freedom)))
         .collect();
         // Scales the variances to their degrees of freedom.
-        let mut matrix = tangent.normal_matrix.clone();
+        let mut matrix = linearization.normal_matrix.clone();
         for (kind, count, freedom) in &estimated {
-            scale_variance(&mut matrix, &tangent, fit, *kind, (1.0, count / freedom));
+            scale_variance(&mut matrix, &linearization, fit, *kind, (1.0, count / freedom));
         }
         let with_increased_variance = estimated
             .iter()
             .map(|(kind, count, freedom)| {
                 let mut increased = matrix.clone();
                 let now = count / freedom;
-                scale_variance(&mut increased, &tangent, fit, *kind, (now, now * (1.0 + VARIANCE_INCREASE)));
+                scale_variance(
+                    &mut increased,
+                    &linearization,
+                    fit,
+                    *kind,
+                    (now, now * (1.0 + VARIANCE_INCREASE)),
+                );
                 (increased.cholesky(), *freedom)
             })
             .collect();
@@ -111,7 +116,7 @@ impl<'a> Covariance<'a> {
             fit,
             factor: matrix.cholesky(),
             matrix,
-            tangent,
+            linearization,
             with_increased_variance,
             bootstrap: Vec::new(),
         }
@@ -146,7 +151,6 @@ impl<'a> Covariance<'a> {
 
     /// Evidence (nats) against zero strength of an effect: half the squared normal deviate with the same tail probability as Student's t,
     /// the largest over its strengths. `None` if no strength can be zero in the scale of the fit.
-    #[must_use]
     pub fn nats_against_zero(&self, effect: usize) -> Option<f64> {
         let choice = &self.fit.model.effects[effect];
         let strengths = choice.info.parameters.iter().zip(&choice.values).enumerate();
@@ -166,14 +170,21 @@ impl<'a> Covariance<'a> {
 
     /// Index of a shared parameter in the covariance; `None` when it is not free.
     pub(crate) fn index_of(&self, role: ParameterRole) -> Option<usize> {
-        self.tangent.shared.iter().position(|n| n.role == role)
+        self.linearization.shared.iter().position(|n| n.role == role)
+    }
+
+    /// Gradient of `scale` times a shared parameter; `None` when it is not free.
+    pub(crate) fn shared_gradient(&self, role: ParameterRole, scale: f64) -> Option<Vec<f64>> {
+        let mut gradient = vec![0.0; self.factor.size()];
+        gradient[self.index_of(role)?] = scale;
+        Some(gradient)
     }
 
     /// Gradient of a parameter of an effect with respect to the fitted parameters.
     pub(crate) fn gradient(&self, effect: usize, parameter: usize) -> Vec<f64> {
         let value = self.fit.model.effects[effect].values[parameter];
-        let mut gradient = vec![0.0; self.tangent.normal_matrix.size];
-        for (i, n) in self.tangent.shared.iter().enumerate() {
+        let mut gradient = vec![0.0; self.linearization.normal_matrix.size];
+        for (i, n) in self.linearization.shared.iter().enumerate() {
             if !matches!(n.role, ParameterRole::Effect { effect: e, .. } if e == effect) {
                 continue;
             }
@@ -187,27 +198,23 @@ impl<'a> Covariance<'a> {
 
     /// Value and half width of the 95 % interval of a shared parameter, in the scale of the fit; `None` when it is not
     /// free.
-    #[must_use]
     pub fn shared_parameter(&self, role: ParameterRole) -> Option<(f64, f64)> {
         let i = self.index_of(role)?;
-        let mut unit = vec![0.0; self.tangent.normal_matrix.size];
-        unit[i] = 1.0;
-        let half = self.half_width(&unit);
-        let by_prior =
-            || self.tangent.shared[i].prior_sd * student_t::quantile(UPPER_PROBABILITY, INFINITE_FREEDOM);
+        let half = self.half_width(&self.shared_gradient(role, 1.0)?);
+        let by_prior = || {
+            self.linearization.shared[i].prior_sd * student_t::quantile(UPPER_PROBABILITY, INFINITE_FREEDOM)
+        };
         Some((self.fit.model.get(role, 0), if half > 0.0 { half } else { by_prior() }))
     }
 
     /// Upper end of the 95 % interval of the prior (scale of the fit) for a puncture force that the data do not bound from above; `None`
     /// otherwise.
-    #[must_use]
     pub fn prior_upper_end(&self, role: ParameterRole) -> Option<f64> {
-        let n = self.tangent.shared.iter().find(|n| n.role == role)?;
+        let n = self.linearization.shared.iter().find(|n| n.role == role)?;
         is_open_above(self.fit, n).then(|| n.prior_mean + n.prior_sd * normal::quantile(UPPER_PROBABILITY))
     }
 
     /// Largest elastic force (N) of a layer in any recording, reduced by the 95 % range of the scatter of its puncture force.
-    #[must_use]
     pub fn reached_force_n(&self, layer: usize) -> f64 {
         let events = self.fit.residuals.ruptures.iter().filter_map(|e| e.get(layer));
         let reached_n = events.map(|e| e.elastic_n).fold(0.0, f64::max);
@@ -216,7 +223,6 @@ impl<'a> Covariance<'a> {
     }
 
     /// Paths of the parameters of an effect that are at a bound of the search.
-    #[must_use]
     pub fn effect_bounds(&self, effect: usize) -> Vec<String> {
         let choice = &self.fit.model.effects[effect];
         let parameters = choice.info.parameters.iter().zip(&choice.values).enumerate();
@@ -228,17 +234,15 @@ impl<'a> Covariance<'a> {
     }
 
     /// Whether a shared parameter is at a bound.
-    #[must_use]
     pub fn at_bound(&self, role: ParameterRole) -> bool {
-        self.tangent.shared.iter().find(|n| n.role == role).is_some_and(|n| {
-            let x = self.fit.model.get(role, 0);
-            let near = 1e-6 * (n.high - n.low).min(1.0);
-            x <= n.low + near || x >= n.high - near
-        })
+        self.linearization
+            .shared
+            .iter()
+            .find(|n| n.role == role)
+            .is_some_and(|n| n.is_at_bound(self.fit.model.get(role, 0), 1e-6))
     }
 
     /// Estimate of an effect parameter with its 95 % interval.
-    #[must_use]
     pub fn effect_parameter(&self, effect: usize, parameter: usize) -> Estimate {
         let choice = &self.fit.model.effects[effect];
         let p = &choice.info.parameters[parameter];
@@ -288,7 +292,6 @@ fn is_open_above(fit: &Fit, n: &Parameter) -> bool {
 
 /// Sets puncture forces that the data do not bound from above to their prior mean and refits, so that they do not constrain stiffness and
 /// relaxation; the fit is unchanged if that increases the objective too much.
-#[must_use]
 pub fn release_unreached_punctures(fit: Fit, data: &FitData) -> Fit {
     let below = |n: &Parameter| n.prior_mean > fit.model.get(n.role, 0) && is_open_above(&fit, n);
     let open: Vec<Parameter> = fit.model.shared_parameters().into_iter().filter(below).collect();
@@ -302,10 +305,13 @@ pub fn release_unreached_punctures(fit: Fit, data: &FitData) -> Fit {
 }
 
 /// Median standard deviation (m) of the parameters that move a kink of the force.
-fn boundary_sd_m(tangent: &Linearization, model: &Model) -> Option<f64> {
-    let variances = tangent.factor().inverse_diagonal();
-    let with_kink =
-        tangent.shared.iter().zip(variances).filter(|(n, v)| moves_a_kink(n.role, model) && v.is_finite());
+fn boundary_sd_m(linearization: &Linearization, model: &Model) -> Option<f64> {
+    let variances = linearization.factor().inverse_diagonal();
+    let with_kink = linearization
+        .shared
+        .iter()
+        .zip(variances)
+        .filter(|(n, v)| moves_a_kink(n.role, model) && v.is_finite());
     let mut sd: Vec<f64> = with_kink.filter(|(n, v)| v.sqrt() > n.step).map(|(_, v)| v.sqrt()).collect();
     (!sd.is_empty()).then(|| stylet_stats::order_statistics::median(&mut sd))
 }
@@ -357,12 +363,12 @@ fn degrees_of_freedom(random_effect: RandomEffect, fit: &Fit) -> Option<(f64, f6
 /// Updates the information matrix for a change of a random-effect variance from `from` to `to` times the fitted one.
 fn scale_variance(
     matrix: &mut SymmetricMatrix,
-    tangent: &Linearization,
+    linearization: &Linearization,
     fit: &Fit,
     random_effect: RandomEffect,
     (from, to): (f64, f64),
 ) {
-    let shared = tangent.shared.len();
+    let shared = linearization.shared.len();
     let (role, row) = match random_effect {
         RandomEffect::Surface => (Some(ParameterRole::RecordingSurface), 0),
         RandomEffect::Friction => (Some(ParameterRole::RecordingFriction), 0),
@@ -370,10 +376,11 @@ fn scale_variance(
         RandomEffect::RuptureDepth => (None, 1),
     };
     if let Some(role) = role {
-        let Some(o) = tangent.per_recording.iter().position(|n| n.role == role) else { return };
-        let information = 1.0 / (tangent.per_recording[o].prior_sd * tangent.per_recording[o].prior_sd);
+        let Some(o) = linearization.per_recording.iter().position(|n| n.role == role) else { return };
+        let information =
+            1.0 / (linearization.per_recording[o].prior_sd * linearization.per_recording[o].prior_sd);
         for r in 0..fit.model.per_recording.len() {
-            let i = tangent.index_of(o, r);
+            let i = linearization.index_of(o, r);
             matrix.add(i, i, information * (1.0 / to - 1.0 / from));
         }
         return;
@@ -389,11 +396,12 @@ fn scale_variance(
             };
             let weight = |times: f64| total * total / (total * total + (times - 1.0) * own * own);
             let change = weight(to) - weight(from);
-            let at =
-                |k: usize| tangent.columns[k].rupture_rows.get(r).and_then(|c| c.get(4 * l + row)).copied();
+            let at = |k: usize| {
+                linearization.columns[k].rupture_rows.get(r).and_then(|c| c.get(4 * l + row)).copied()
+            };
             let shared_parameters = (0..shared).map(|i| (i, i));
             let recording_parameters =
-                (0..tangent.per_recording.len()).map(|o| (tangent.index_of(o, r), shared + o));
+                (0..linearization.per_recording.len()).map(|o| (linearization.index_of(o, r), shared + o));
             let derivatives: Vec<(usize, f64)> = shared_parameters
                 .chain(recording_parameters)
                 .filter_map(|(i, k)| at(k).filter(|c| *c != 0.0).map(|c| (i, c)))

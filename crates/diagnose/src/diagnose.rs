@@ -1,7 +1,7 @@
 //! Diagnoses recordings: identifies the effects that the scenario lacks, with intervals and the improvement on held-out recordings.
 
 use crate::base_law_fit::{PreparedRecordings, ReplayCount, assumptions_of, fit_base_law};
-use crate::check_json::{CheckItem, Light};
+use crate::check_json::{CheckItem, Rating};
 use crate::claims::{self, Context, have_one_motion};
 use crate::competing_effects::{CompetingEffect, find_competing_effects};
 use crate::diagnosis_json::*;
@@ -17,7 +17,7 @@ use crate::held_out::{
 };
 use crate::identifiability::{advice, not_identifiable, visible_effects};
 use crate::input_checks::{
-    CleanRecordings, NamedRecording, check_recordings, clean_recordings, force_outlier_notes,
+    CleanRecordings, NamedRecording, average_blocks, check_recordings, clean_recordings, force_outlier_notes,
 };
 use crate::measured_start::{first_effect, search_from_any_start};
 use crate::model_grade::grade;
@@ -30,13 +30,13 @@ use crate::sensor_artefact_causes::sensor_artefact_causes;
 use crate::verdict::{Assessment, assess_search, is_kept, move_negligible};
 use crate::zero_steps::{ZeroStepReport, zero_effects};
 use std::sync::Arc;
-use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::block_averages::BLOCK_S;
 use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::FitData;
+use stylet_identify::model::Model;
 use stylet_record::sensor_artefacts::SensorArtefacts;
 use stylet_record::{QualityKind, Recording};
 use stylet_scenario::Scenario;
-use stylet_stats::parallel::*;
 use stylet_tissue::{AnyEffect, Effect};
 
 /// Options of a diagnosis.
@@ -62,8 +62,6 @@ pub struct DiagnosisResult {
     pub competing_effects: Vec<Vec<CompetingEffect>>,
     /// Held-out residuals of the base law.
     pub base_held_out: Vec<Option<FreeRunResidual>>,
-    /// Held-out residuals of the extended model.
-    pub extended_held_out: Vec<Option<FreeRunResidual>>,
 }
 
 /// Reason why an effect is negligible in the presence of an unmodelled one.
@@ -81,7 +79,7 @@ pub(crate) fn diagnose_given_layers(
     let force_ratios = match check_recordings(scenario, recordings) {
         Ok(ratios) => ratios,
         Err(why) if options.force && why.is_implausible() => {
-            check.push(CheckItem::new("recordings", Light::Unusable, why.to_string()));
+            check.push(CheckItem::new("recordings", Rating::Unusable, why.to_string()));
             vec![None; recordings.len()]
         }
         Err(why) => return Err(why),
@@ -90,7 +88,7 @@ pub(crate) fn diagnose_given_layers(
     if !options.brief {
         check.extend(check_before_fit(scenario, recordings, &clean, &notes));
         let unusable: Vec<&str> =
-            check.iter().filter(|i| i.light == Light::Unusable).map(|i| i.message.as_str()).collect();
+            check.iter().filter(|i| i.light == Rating::Unusable).map(|i| i.message.as_str()).collect();
         if !unusable.is_empty() && !options.force {
             return Err(DiagnoseError::Unusable { reasons: unusable.join("; ") });
         }
@@ -179,11 +177,8 @@ pub(crate) fn diagnose_given_layers(
     mark_mains(&mut causes, &search);
     let has_cause = has_cause(&search, &causes);
     // Without an identified effect the base law is the final model, unless the best model predicts better despite an unmodelled force.
-    let partial = if assessment.unknown {
-        partial_model(&search, &base_held_out, &extended_held_out, noise_n)
-    } else {
-        None
-    };
+    let partial_model = || partial_model(&search, &base_held_out, &extended_held_out, noise_n);
+    let partial = assessment.unknown.then(partial_model).flatten();
     let extended_held_out =
         if has_cause || partial.is_some() { extended_held_out } else { base_held_out.clone() };
     let verdict = if assessment.unknown {
@@ -211,9 +206,9 @@ pub(crate) fn diagnose_given_layers(
         rmse_after_n: pooled_rms(&extended_held_out, &search.data),
         rmse_given_scatter_n: pooled_rms_given_scatter(&extended_held_out, &search.data),
         floor_n: noise_n,
-        per_recording_n: errors_per_recording(&base_held_out, &extended_held_out, &search)
-            .into_iter()
-            .map(|(before, after)| (with_tones(before), after))
+        per_recording_n: errors_per_recording_n(&base_held_out, &search)
+            .map(with_tones)
+            .zip(errors_per_recording_n(&extended_held_out, &search))
             .collect(),
     };
     let mut data_quality = Vec::new();
@@ -227,12 +222,8 @@ pub(crate) fn diagnose_given_layers(
     }
     let mut diagnosis = Diagnosis {
         verdict,
-        agrees: false,
-        grade: None,
-        findings: Vec::new(),
         check,
         visible_effects,
-        formulas: None,
         partial,
         advice: advice(&causes, &not_identifiable, common_motion_period_s(&search.data)),
         base_parameters: assessment.base_parameters,
@@ -251,9 +242,9 @@ pub(crate) fn diagnose_given_layers(
         data_quality,
         search_steps: search.stages.iter().map(search_step).collect(),
         noise: NoiseReport { sd_n: noise_n, ar: autoregression(&search), from_air: false },
-        random_effect_sd: random_effect_sd(&search),
-        training: None,
+        random_effect_sd: random_effect_sd(&search.best.model),
         causes,
+        ..Diagnosis::default()
     };
     let context = Context {
         one_motion,
@@ -273,7 +264,6 @@ pub(crate) fn diagnose_given_layers(
         search,
         competing_effects: competing,
         base_held_out,
-        extended_held_out,
     })
 }
 
@@ -301,11 +291,8 @@ fn prepare(
 ) -> (PreparedRecordings, Vec<FastTone>) {
     let tones = remove_fast_tones(clean, &raw.exclude, BLOCK_S);
     let assumed = Arc::new(without_removed_tones(assumptions_of(scenario), &tones));
-    let blocks: Vec<BlockAverages> =
-        clean.par_iter().zip(&raw.exclude).map(|(r, x)| BlockAverages::new(r, x, BLOCK_S)).collect();
-    let quantisation_n = raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD;
-    let replayed = Arc::clone(replayed);
-    (PreparedRecordings { replayed, ..PreparedRecordings::new(assumed, blocks, quantisation_n) }, tones)
+    let prepared = PreparedRecordings::new(assumed, average_blocks(clean, raw), raw.quantisation_sd_n());
+    (PreparedRecordings { replayed: Arc::clone(replayed), ..prepared }, tones)
 }
 
 /// The best model with at most one effect, if it leaves only noise; `None` also when the limit of replays was reached before.
@@ -339,22 +326,19 @@ fn labels_of_causes(
     (labels.into_iter().filter(is_kept).collect(), rows.collect())
 }
 
-fn errors_per_recording(
-    before: &[Option<FreeRunResidual>],
-    after: &[Option<FreeRunResidual>],
+/// RMS error (N) of each recording, including the noise of samples within their blocks.
+fn errors_per_recording_n(
+    residuals: &[Option<FreeRunResidual>],
     search: &Search,
-) -> Vec<(f64, f64)> {
-    let one = |l: &Option<FreeRunResidual>, k: usize| {
-        l.as_ref().map_or(f64::NAN, |l| {
-            (l.mean_square_n2 + search.data.recordings[k].within_block_sd_n().powi(2)).sqrt()
-        })
-    };
-    before.iter().zip(after).enumerate().map(|(k, (b, a))| (one(b, k), one(a, k))).collect()
+) -> impl Iterator<Item = f64> {
+    residuals.iter().zip(search.data.recordings.iter()).map(|(l, b)| {
+        l.as_ref().map_or(f64::NAN, |l| (l.mean_square_n2 + b.within_block_sd_n().powi(2)).sqrt())
+    })
 }
 
-/// Standard deviations of the random effects of the best model.
-fn random_effect_sd(search: &Search) -> RandomEffectSd {
-    let (s, free) = (&search.best.model.scatter, &search.best.model.free);
+/// Standard deviations of the random effects of a model.
+pub(crate) fn random_effect_sd(model: &Model) -> RandomEffectSd {
+    let (s, free) = (&model.scatter, &model.free);
     RandomEffectSd {
         puncture: s.rupture_force,
         rupture_depth_m: s.rupture_depth_m,
@@ -376,7 +360,7 @@ fn air_noise_n(scenario: &Scenario, data: &FitData) -> Option<f64> {
             let sum: &mut (f64, f64) = &mut sums[*k as usize];
             *sum = (sum.0 + e * e, sum.1 + 1.0);
         }
-        let in_air = |k: usize| b.motion.at(0.5 * (b.start_s[k] + b.end_s[k])).0 < end_m;
+        let in_air = |k: usize| b.motion.at(b.mid_s(k)).0 < end_m;
         squares.extend(
             (0..b.len()).filter(|k| b.used[*k] && in_air(*k)).map(|k| sums[k].0 / f64::max(sums[k].1, 1.0)),
         );

@@ -10,10 +10,11 @@ use std::collections::BTreeMap;
 use stylet_record::QualityNote;
 
 /// Verdict of a diagnosis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// The data agree with the scenario.
+    #[default]
     None,
     /// One or more effects were identified.
     Named,
@@ -114,7 +115,7 @@ impl Grade {
 }
 
 /// Improvement of the prediction.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Gain {
     /// Whether the errors are those of held-out recordings instead of fitted ones.
     pub held_out: bool,
@@ -139,21 +140,19 @@ const MIN_WORSENING: f64 = 1.25;
 
 impl Gain {
     /// Whether held-out recordings are predicted worse than by the base law.
-    #[must_use]
-    pub fn is_worse(&self) -> bool {
+    pub(crate) fn is_worse(&self) -> bool {
         self.rmse_after_n > MIN_WORSENING * self.rmse_before_n
     }
 
     /// RMS error in N that contradicts the model: beyond the scatter between recordings, or the whole error of a model that predicts
     /// worse than the base law.
-    #[must_use]
-    pub fn misfit_n(&self) -> f64 {
+    pub(crate) fn misfit_n(&self) -> f64 {
         if self.is_worse() { self.rmse_after_n } else { self.rmse_given_scatter_n }
     }
 }
 
 /// Structure that remains in the residual.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ResidualStructureReport {
     /// Smallest p-value of the residual tests, corrected for their number.
     pub p_value: f64,
@@ -193,7 +192,7 @@ pub struct SearchStep {
 }
 
 /// Measurement noise.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NoiseReport {
     /// Standard deviation in N.
     pub sd_n: f64,
@@ -333,7 +332,7 @@ pub struct Finding {
 }
 
 /// Result of a diagnosis.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Diagnosis {
     /// Verdict.
     pub verdict: Verdict,

@@ -10,7 +10,6 @@ use crate::random_effect_selection::select_random_effects;
 use crate::reweighted_fit::fit_reweighted;
 use crate::selection_restarts::{MAX_BEHIND_SHARE, is_new_effect};
 pub use crate::selection_state::{Search, SearchStage};
-use stylet_identify::evidence_nats::Nats;
 use stylet_identify::fit::{Effort, Fit, fit, fit_if_below};
 use stylet_identify::likelihood::{FitData, residuals};
 use stylet_identify::model::Model;
@@ -79,8 +78,7 @@ impl Search {
     }
 
     /// Continues the selection with reweighted fits ([`fit_reweighted`]), for data with an unmodelled effect.
-    #[must_use]
-    pub fn continue_reweighted(&self, prepared: &PreparedRecordings) -> Option<Self> {
+    pub(crate) fn continue_reweighted(&self, prepared: &PreparedRecordings) -> Option<Self> {
         let (best, data) = fit_reweighted(&self.best, &self.data)?;
         let mut search = self.with_best(best, data);
         while search.best.model.effects.len() < MAX_EFFECTS
@@ -129,10 +127,10 @@ impl Search {
                 continue;
             }
             let gained = likelihood_gain(&self.best, &f, &self.data);
-            if gained < Nats::new(needed) {
+            if gained < needed {
                 continue;
             }
-            stage.selected = Some((name(&f), gained.value()));
+            stage.selected = Some((name(&f), gained));
             self.accept(f);
             self.use_extended_forms(&times);
             break;
@@ -224,7 +222,8 @@ impl Search {
         full
     }
 
-    fn penalty_of(&self, model: &Model) -> f64 {
+    /// BIC penalty (nats) of the effects and steps of a model.
+    pub(crate) fn penalty_of(&self, model: &Model) -> f64 {
         bic_penalty(model.effect_parameter_count(), self.data.compared_block_count())
     }
 

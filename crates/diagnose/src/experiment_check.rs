@@ -1,20 +1,21 @@
 //! Checks before the effect search what recordings can show about a scenario.
 
 use crate::base_law_fit::{PreparedRecordings, assumptions_of, fit_base_law};
-use crate::check_json::{CheckItem, EffectVisibility, Light};
+use crate::check_json::{CheckItem, EffectVisibility, Rating};
 use crate::claims::have_one_motion;
 use crate::confidence_intervals::Covariance;
 use crate::diagnosis_json::{BaseParameter, LabelledParameter, ParameterLabel};
 use crate::error::DiagnoseError;
 use crate::identifiability::visible_effects;
-use crate::input_checks::{CleanRecordings, NamedRecording, check_recordings, clean_recordings};
+use crate::input_checks::{
+    CleanRecordings, NamedRecording, average_blocks, check_recordings, clean_recordings,
+};
 use crate::parameter_labels::label_parameters;
 use crate::verdict::{BOOTSTRAP_SEED, base_parameters};
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use stylet_core::{EnhanceConfig, Sample};
-use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
 use stylet_record::{QualityKind, QualityNote, Recording};
 use stylet_scenario::Scenario;
 use stylet_score::{ContactFinding, ContactHypothesis, Trace};
@@ -45,7 +46,7 @@ impl ExperimentCheck {
     /// Whether no item rates the recordings unusable.
     #[must_use]
     pub fn is_usable(&self) -> bool {
-        self.items.iter().all(|item| item.light != Light::Unusable)
+        self.items.iter().all(|item| item.light != Rating::Unusable)
     }
 }
 
@@ -60,15 +61,14 @@ pub fn check_experiment(
 ) -> Result<ExperimentCheck, DiagnoseError> {
     let mut out = ExperimentCheck::default();
     if let Err(why) = check_recordings(scenario, recordings) {
-        out.items.push(CheckItem::new("recordings", Light::Unusable, why.to_string()));
+        out.items.push(CheckItem::new("recordings", Rating::Unusable, why.to_string()));
         return Ok(out);
     }
     let CleanRecordings { recordings: clean, notes, raw } = clean_recordings(recordings);
     out.items = check_before_fit(scenario, recordings, &clean, &notes);
-    let blocks: Vec<BlockAverages> =
-        clean.par_iter().zip(&raw.exclude).map(|(r, x)| BlockAverages::new(r, x, BLOCK_S)).collect();
-    let min_noise_n = raw.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD;
-    let prepared = PreparedRecordings::new(Arc::new(assumptions_of(scenario)), blocks, min_noise_n);
+    let blocks = average_blocks(&clean, &raw);
+    let prepared =
+        PreparedRecordings::new(Arc::new(assumptions_of(scenario)), blocks, raw.quantisation_sd_n());
     let (fit, data) = fit_base_law(&prepared).ok_or(DiagnoseError::NoFit)?;
     let covariance = Covariance::new(&fit, &data, &mut ChaCha8Rng::seed_from_u64(BOOTSTRAP_SEED));
     out.base_parameters = base_parameters(&covariance);
@@ -91,24 +91,24 @@ pub(crate) fn check_before_fit(
     let all = recordings.iter().zip(notes).flat_map(|(r, notes)| notes.iter().map(move |n| (r, n)));
     let (converted, remarks): (Vec<_>, Vec<_>) = all.partition(|(_, n)| n.kind == QualityKind::Converted);
     for (r, note) in remarks {
-        let light = if note.blocking { Light::Unusable } else { Light::Limited };
+        let light = if note.blocking { Rating::Unusable } else { Rating::Limited };
         items.push(CheckItem::new("recordings", light, format!("{}: {}", r.name, note.message)));
     }
     if items.is_empty() {
         let what = if clean.len() == 1 { "one recording" } else { "recordings" };
         let hz = stylet_stats::median_of(clean.iter().map(Recording::sample_hz));
         let message = format!("{what} without gaps or spikes, {hz:.0} Hz");
-        items.push(CheckItem::new("recordings", Light::Good, message));
+        items.push(CheckItem::new("recordings", Rating::Good, message));
     }
     let mut conversions: Vec<&str> = converted.iter().map(|(_, note)| note.message.as_str()).collect();
     let mut known = std::collections::BTreeSet::new();
     conversions.retain(|message| known.insert(*message));
     if !conversions.is_empty() {
-        items.push(CheckItem::new("recordings", Light::Good, conversions.join("; ")));
+        items.push(CheckItem::new("recordings", Rating::Good, conversions.join("; ")));
     }
     if clean.len() == 1 {
         let message = "one recording: no prediction can be tested on another; record at least two";
-        items.push(CheckItem::new("recordings", Light::Limited, message.to_owned()));
+        items.push(CheckItem::new("recordings", Rating::Limited, message.to_owned()));
     }
     items.extend(check_contact(recordings, clean));
     items.extend(check_motion(&scenario.tissue, clean));
@@ -128,9 +128,9 @@ fn check_contact(recordings: &[NamedRecording], clean: &[Recording]) -> Vec<Chec
     let all_without = found.iter().all(is_none);
     let item = |(r, contact): (&NamedRecording, &ContactFinding)| {
         let light = match contact.hypothesis {
-            _ if is_none(contact) && all_without => Light::Unusable,
-            ContactHypothesis::ConstantOffset => Light::Good,
-            _ => Light::Limited,
+            _ if is_none(contact) && all_without => Rating::Unusable,
+            ContactHypothesis::ConstantOffset => Rating::Good,
+            _ => Rating::Limited,
         };
         CheckItem::new("contact", light, format!("{}: {}", r.name, contact.sentence()))
     };
@@ -163,14 +163,14 @@ fn check_motion(tissue: &Tissue, recordings: &[Recording]) -> Vec<CheckItem> {
     let mm = |mps: f64| format!("{:.3} mm/s", 1e3 * mps);
     items.push(if fastest > ONE_SPEED_FACTOR * slowest {
         let message = format!("speeds from {} to {} in the tissue", mm(slowest), mm(fastest));
-        CheckItem::new("motion", Light::Good, message)
+        CheckItem::new("motion", Rating::Good, message)
     } else {
         let message = format!(
             "one constant speed of {} in the tissue: most friction laws look the same, and the stiffness of a layer separates from its \
              friction only where it ruptures; vary the speed within each layer",
             mm(fastest)
         );
-        CheckItem::new("motion", Light::Limited, message)
+        CheckItem::new("motion", Rating::Limited, message)
     });
     let missing: Vec<&str> = [
         (hold_s < MIN_HOLD_S, "no hold inside the tissue, which would show relaxation"),
@@ -184,7 +184,7 @@ fn check_motion(tissue: &Tissue, recordings: &[Recording]) -> Vec<CheckItem> {
     .filter_map(|(is_missing, what)| is_missing.then_some(what))
     .collect();
     if !missing.is_empty() {
-        items.push(CheckItem::new("motion", Light::Limited, missing.join("; ")));
+        items.push(CheckItem::new("motion", Rating::Limited, missing.join("; ")));
     }
     let unreached = (0..tissue.layers.len()).filter(|k| tissue.front_m(*k) >= deepest_m).count();
     if unreached > 0 {
@@ -193,7 +193,7 @@ fn check_motion(tissue: &Tissue, recordings: &[Recording]) -> Vec<CheckItem> {
             1e3 * deepest_m,
             tissue.layers.len()
         );
-        items.push(CheckItem::new("depth", Light::Limited, message));
+        items.push(CheckItem::new("depth", Rating::Limited, message));
     }
     items
 }
@@ -208,11 +208,11 @@ pub(crate) fn parameters_item(parameters: &[LabelledParameter]) -> CheckItem {
     let total = of_layers().count();
     if open.is_empty() {
         let message = format!("all {total} parameters of the layers are determined");
-        return CheckItem::new("parameters", Light::Good, message);
+        return CheckItem::new("parameters", Rating::Good, message);
     }
     let message =
         format!("{} of {total} parameters are determined; not: {}", total - open.len(), open.join(", "));
-    CheckItem::new("parameters", Light::Limited, message)
+    CheckItem::new("parameters", Rating::Limited, message)
 }
 
 /// Item: number of effects detectable at their typical size.
@@ -221,10 +221,10 @@ pub(crate) fn effects_item(effects: &[EffectVisibility]) -> CheckItem {
     let total = effects.len();
     if hidden.is_empty() {
         let message = format!("all {total} effects would be seen at their typical size");
-        return CheckItem::new("effects", Light::Good, message);
+        return CheckItem::new("effects", Rating::Good, message);
     }
     let seen = total - hidden.len();
     let message =
         format!("{seen} of {total} effects would be seen at their typical size; not: {}", hidden.join(", "));
-    CheckItem::new("effects", Light::Limited, message)
+    CheckItem::new("effects", Rating::Limited, message)
 }

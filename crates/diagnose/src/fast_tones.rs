@@ -8,6 +8,7 @@
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty};
 use core::f64::consts::{PI, TAU};
 use stylet_record::Recording;
+use stylet_stats::golden_section;
 use stylet_stats::order_statistics::median_of;
 use stylet_stats::parallel::*;
 use stylet_stats::spectrum::{PADDING, PowerSpectrum, SampledSignal};
@@ -234,25 +235,9 @@ fn spectral_peak(spectrum: &PowerSpectrum, lowest_hz: f64) -> Option<(usize, f64
 
 /// Frequency (Hz) of the largest power within a bin of a peak, by golden section.
 fn refined(samples: &[Samples], hz: f64, bin_hz: f64, highest_hz: f64) -> f64 {
-    /// Ratio of the golden section.
-    const SHARE: f64 = 0.618_033_988_749_894_9;
     /// Steps of the golden section, which locate the maximum to 1e-5 of a bin.
     const ITERATIONS: usize = 24;
-    let (mut low, mut high) = (hz - bin_hz, (hz + bin_hz).min(highest_hz));
-    let (mut a, mut b) = (high - SHARE * (high - low), low + SHARE * (high - low));
-    let (mut pa, mut pb) = (power(samples, a), power(samples, b));
-    for _ in 0..ITERATIONS {
-        if pa > pb {
-            (high, b, pb) = (b, a, pa);
-            a = high - SHARE * (high - low);
-            pa = power(samples, a);
-        } else {
-            (low, a, pa) = (a, b, pb);
-            b = low + SHARE * (high - low);
-            pb = power(samples, b);
-        }
-    }
-    0.5 * (low + high)
+    golden_section(|hz| -power(samples, hz), (hz - bin_hz, (hz + bin_hz).min(highest_hz)), ITERATIONS)
 }
 
 /// Fits a tone of one frequency in noise of `variance` (N²) per sample; returns it and its force in every recording.

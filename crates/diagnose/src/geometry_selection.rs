@@ -116,7 +116,6 @@ fn constrain_base_law(search: &mut Search, prepared: &PreparedRecordings) {
 
 /// The model with free geometry for confidence intervals, which would be too narrow with known boundaries. With an effect that moves
 /// boundaries they stay fixed, because the effect would not be identifiable.
-#[must_use]
 pub fn free_geometry(model: &Model) -> Model {
     let moves =
         |i: &EffectInfo| matches!(i.proposal, Proposal::LayerFaces(_)) || i.stage == ChainStage::Position;

@@ -26,7 +26,6 @@ pub struct FreeRunResidual {
 }
 
 /// Free-run prediction of recording `r`; each predicted rupture is shifted by at most two samples to its best fit.
-#[must_use]
 pub fn predict_free_run(model: &Model, data: &FitData, r: usize) -> Option<FreeRunResidual> {
     let mut cache = ReplayCache::new(model, data, r)?;
     let b = &data.recordings[r];
@@ -53,7 +52,7 @@ pub fn predict_free_run(model: &Model, data: &FitData, r: usize) -> Option<FreeR
     let predicted = replay(&at, data, r)?;
     let residual_n = residual(data, r, &predicted.force_n);
     let mean_square_n2 = mean_square(&residual_n, data, r);
-    let compared_blocks = b.used.iter().filter(|u| **u).count();
+    let compared_blocks = b.compared_block_count();
     Some(FreeRunResidual {
         mean_square_n2,
         given_scatter_n2: mean_square_n2,
@@ -64,14 +63,12 @@ pub fn predict_free_run(model: &Model, data: &FitData, r: usize) -> Option<FreeR
 }
 
 /// Predicts every recording from a fit to the others; a single recording is predicted by its own fit.
-#[must_use]
 pub fn held_out_residuals(best: &Fit, data: &FitData) -> Vec<Option<FreeRunResidual>> {
     held_out_residuals_with(best, data, |_| RecordingParameters::default())
 }
 
 /// As [`held_out_residuals`], but with the random effects (surface, friction) of the held-out recording known, so that the gain of a cause
 /// does not depend on where the needle touched.
-#[must_use]
 pub fn held_out_residuals_with_random_effects(best: &Fit, data: &FitData) -> Vec<Option<FreeRunResidual>> {
     held_out_residuals_with(best, data, |r| best.model.per_recording[r])
 }
@@ -125,7 +122,6 @@ pub struct JackknifeResult {
 }
 
 /// Jackknife of every effect of a fit; `floor_n` is the noise standard deviation of a sample in N.
-#[must_use]
 pub fn jackknife_effects(best: &Fit, data: &FitData, floor_n: f64) -> Vec<JackknifeResult> {
     let n = data.recording_count();
     if n < 2 {
@@ -193,13 +189,11 @@ fn refit_without(best: &Fit, data: &FitData, r: usize) -> Option<Model> {
 }
 
 /// RMS residual (N) over all recordings, including the noise of samples within their blocks.
-#[must_use]
 pub fn pooled_rms(residuals: &[Option<FreeRunResidual>], data: &FitData) -> f64 {
     pooled_rms_of(residuals, data, |l| l.mean_square_n2)
 }
 
 /// The same given the scatter between recordings.
-#[must_use]
 pub fn pooled_rms_given_scatter(residuals: &[Option<FreeRunResidual>], data: &FitData) -> f64 {
     pooled_rms_of(residuals, data, |l| l.given_scatter_n2)
 }
@@ -220,7 +214,6 @@ fn pooled_rms_of(
 }
 
 /// Standard deviation in N of the noise of a single sample.
-#[must_use]
 pub fn sample_noise_sd_n(data: &FitData) -> f64 {
     let n = data.recording_count().max(1) as f64;
     let within = data.recordings.iter().map(|b| b.within_block_sd_n().powi(2)).sum::<f64>() / n;

@@ -27,7 +27,6 @@ const SIZE_STEPS: usize = 3;
 ///
 /// The geometry is free and the priors on layer parameters are weak, because what follows from their tolerance alone is no evidence.
 /// Effects that resemble each other are not distinguished here; the diagnosis lists them as equivalent.
-#[must_use]
 pub fn visible_effects(best: &Fit, data: &FitData) -> Vec<EffectVisibility> {
     let mut model = free_geometry(&best.model);
     model.assumed = Arc::new(model.assumed.with_weak_priors());
@@ -66,7 +65,6 @@ fn visibility(info: &'static EffectInfo, score_test: &ScoreTest) -> Option<Effec
 }
 
 /// Effects that are not identifiable from these recordings, in the order of the library; `visible` contains those with a column to test.
-#[must_use]
 pub fn not_identifiable(best: &Fit, data: &FitData, visible: &[EffectVisibility]) -> Vec<String> {
     let is_identifiable = |info: &EffectInfo| match visible.iter().find(|v| v.effect == info.id) {
         Some(v) => v.nats >= REQUIRED_NATS,
@@ -111,7 +109,6 @@ fn has_clock(info: &EffectInfo) -> bool {
 }
 
 /// Advice on motions that would distinguish equivalent effects or make effects identifiable.
-#[must_use]
 pub fn advice(causes: &[Cause], not_identifiable: &[String], motion_period_s: Option<f64>) -> Vec<String> {
     let mut advice = Vec::new();
     for cause in causes.iter().filter(|c| !c.equivalent.is_empty()) {

@@ -1,9 +1,11 @@
 //! Checks recordings for plausibility against the scenario (length, reach, units, signs), and cleans them.
 
 use crate::error::DiagnoseError;
+use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
 use stylet_record::sensor_artefacts::{SensorArtefacts, find_sensor_artefacts};
 use stylet_record::{MIN_SAMPLES, QualityKind, QualityNote, Recording, assess};
 use stylet_scenario::Scenario;
+use stylet_stats::parallel::*;
 use stylet_tissue::{ForceLaw, replay};
 
 /// A recording with its name.
@@ -188,15 +190,8 @@ pub(crate) fn force_outlier_notes(ratios: &[Option<f64>]) -> Vec<Option<QualityN
             "it is not like the others: its force is {ratio:.2} times what the scenario expects of its motion, that of the others {typical:.2} \
              times; check its tissue, needle and units, or leave it out"
         );
-        let numbers =
-            [("force_ratio", ratio), ("others_force_ratio", typical)].map(|(name, x)| (name.to_owned(), x));
-        Some(QualityNote {
-            kind: QualityKind::OutlierRecording,
-            message,
-            numbers: numbers.into_iter().collect(),
-            lines: Vec::new(),
-            blocking: false,
-        })
+        let numbers = [("force_ratio", ratio), ("others_force_ratio", typical)];
+        Some(QualityNote::new(QualityKind::OutlierRecording, message, numbers))
     };
     (0..ratios.len()).map(note).collect()
 }
@@ -286,6 +281,11 @@ pub(crate) fn clean_recordings(named: &[NamedRecording]) -> CleanRecordings {
     CleanRecordings { recordings, notes, raw }
 }
 
+/// Blocks of recordings, without the samples that sensor artefacts exclude.
+pub(crate) fn average_blocks(recordings: &[Recording], raw: &SensorArtefacts) -> Vec<BlockAverages> {
+    recordings.par_iter().zip(&raw.exclude).map(|(r, x)| BlockAverages::new(r, x, BLOCK_S)).collect()
+}
+
 /// The recording without non-finite samples.
 pub(crate) fn drop_non_finite(r: &Recording) -> Recording {
     let kept: Vec<usize> = (0..r.len()).filter(|i| is_finite_sample(r, *i)).collect();
@@ -312,9 +312,8 @@ pub(crate) fn non_finite_note(r: &Recording) -> Option<QualityNote> {
         bad.len(),
         first + 1
     );
-    let numbers =
-        [("count".to_owned(), bad.len() as f64), ("first".to_owned(), first as f64)].into_iter().collect();
-    Some(QualityNote { kind: QualityKind::Gaps, message, numbers, lines: Vec::new(), blocking: false })
+    let numbers = [("count", bad.len() as f64), ("first", first as f64)];
+    Some(QualityNote::new(QualityKind::Gaps, message, numbers))
 }
 
 #[cfg(test)]

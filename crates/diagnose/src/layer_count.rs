@@ -113,7 +113,7 @@ fn other_layers(
     loop {
         let fit = simple_explanation(&other, recordings, replayed, progress)?;
         let count = other.tissue.layers.len();
-        if count == 1 || bears_force(&fit.model.tissue, recordings) {
+        if count == 1 || carries_force(&fit.model.tissue, recordings) {
             return (count != scenario.tissue.layers.len()).then_some(other);
         }
         other.tissue.layers.truncate(count - 1);
@@ -132,16 +132,16 @@ fn diagnose_without_empty_layer(
         let result = diagnose_given_layers(&scenario, recordings, options, replayed, progress)?;
         let count = scenario.tissue.layers.len();
         let is_cut_short = result.diagnosis.findings.iter().any(|f| f.kind == FindingKind::SearchLimit);
-        if count == 1 || is_cut_short || bears_force(&result.search.best.model.tissue, recordings) {
+        if count == 1 || is_cut_short || carries_force(&result.search.best.model.tissue, recordings) {
             return Ok((scenario, result));
         }
-        progress("again without the last layer, which bears no force");
+        progress("again without the last layer, which carries no force");
         scenario.tissue.layers.truncate(count - 1);
     }
 }
 
 /// Whether the last layer's elastic force at the deepest point is a noticeable share of the largest force.
-fn bears_force(tissue: &Tissue, recordings: &[NamedRecording]) -> bool {
+fn carries_force(tissue: &Tissue, recordings: &[NamedRecording]) -> bool {
     let Some(last) = tissue.layers.len().checked_sub(1) else { return true };
     let largest = |values: &[f64]| values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let over_all = |f: fn(&NamedRecording) -> &[f64]| {

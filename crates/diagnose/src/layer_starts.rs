@@ -68,10 +68,10 @@ struct Table {
 
 impl Table {
     fn new(blocks: &BlockAverages, drops: &[ForceDrop]) -> Self {
-        let block_s = blocks.sample_step_s * blocks.samples_per_block as f64;
+        let block_s = blocks.block_s();
         let b = blocks.coarsened(((ROW_S / block_s).round() as usize).max(1));
         let at = |k: usize| {
-            let time_s = 0.5 * (b.start_s[k] + b.end_s[k]);
+            let time_s = b.mid_s(k);
             let (position_m, velocity_mps) = b.motion.at(time_s);
             [time_s, position_m, velocity_mps, b.force_n[k]]
         };

@@ -8,13 +8,11 @@ const MAX_HARMONIC: u32 = 5;
 const MAINS_DEVIATION_HZ: f64 = 0.15;
 
 /// Apparent frequency (Hz) of a tone of `hz` sampled at `sample_hz`.
-#[must_use]
 pub fn aliased_hz(hz: f64, sample_hz: f64) -> f64 {
     (hz - sample_hz * (hz / sample_hz).round()).abs()
 }
 
 /// Remark on a tone at `hz` in samples at `sample_hz`, resolved to `resolution_hz`: the lowest mains harmonic that appears there, if any.
-#[must_use]
 pub fn mains_remark(hz: f64, sample_hz: f64, resolution_hz: f64) -> Option<String> {
     (1..=MAX_HARMONIC).find_map(|harmonic| {
         let order = f64::from(harmonic);

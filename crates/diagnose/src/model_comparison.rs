@@ -1,6 +1,5 @@
 //! Compares models by their likelihood under the noise of the larger one, and the BIC.
 
-use stylet_identify::evidence_nats::{Nats, UnderLargerModelNoise};
 use stylet_identify::fit::{Effort, Fit, fit_from_zero_scatter};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::noise::NoiseSource;
@@ -14,20 +13,19 @@ pub(crate) fn confidence(surplus_nats: f64, competitors: f64) -> f64 {
     1.0 / (1.0 + competitors + libm::exp(-surplus_nats.clamp(-30.0, 30.0) - 3.0))
 }
 
-/// Gain in nats of `larger` over `smaller`, both fitted under the noise estimated from the residual of `larger`.
-#[must_use]
-pub fn likelihood_gain(smaller: &Fit, larger: &Fit, data: &FitData) -> Nats<UnderLargerModelNoise> {
+/// Gain in nats of `larger` over `smaller`, both fitted under the noise estimated from the residual of `larger`, with their priors and
+/// rupture terms. Gains under another noise are not comparable: small noise makes every model gain much.
+pub fn likelihood_gain(smaller: &Fit, larger: &Fit, data: &FitData) -> f64 {
     let larger_data = data.with_estimated_noise(&larger.residuals.residual_n, NoiseSource::Residual);
     let effort = Effort { max_iterations: 3, min_gain_nats: 0.2 };
     let refit = |f: &Fit| fit_from_zero_scatter(&f.model, &larger_data, effort);
     match rayon::join(|| refit(smaller), || refit(larger)) {
-        (Some(a), Some(b)) => Nats::new(a.nats() - b.nats()),
-        _ => Nats::new(f64::NEG_INFINITY),
+        (Some(a), Some(b)) => a.nats() - b.nats(),
+        _ => f64::NEG_INFINITY,
     }
 }
 
 /// BIC penalty in nats: `parameters / 2 * ln(blocks)` (Schwarz 1978).
-#[must_use]
 pub fn bic_penalty(parameters: usize, blocks: usize) -> f64 {
     0.5 * parameters as f64 * libm::log(blocks.max(2) as f64)
 }

@@ -18,7 +18,6 @@ const MAX_ERROR: [f64; 3] = [1.25, 2.0, 4.0];
 const MIN_DETERMINED: [f64; 3] = [2.0 / 3.0, 0.5, 0.25];
 
 /// Grade of a finished diagnosis; errors up to `resolution_n` (N) are not a misfit.
-#[must_use]
 pub fn grade(d: &Diagnosis, resolution_n: f64) -> Grade {
     let mut parts = Vec::new();
     let mut add = |part: &str, letter: Letter, reason: String| {

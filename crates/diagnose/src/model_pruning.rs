@@ -3,7 +3,6 @@
 use crate::base_law_fit::with_updated_times;
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use crate::selection_state::Search;
-use stylet_identify::evidence_nats::Nats;
 use stylet_identify::fit::{Effort, Fit, Linearization, fit};
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::{EffectTerm, ParameterRole};
@@ -35,10 +34,11 @@ impl Search {
             if let Some(f) = full
                 && !effect_at_bound(&f, k)
                 && strengths_are_determined(&f, k, &self.data)
-                && likelihood_gain(&self.best, &f, &self.data).exceeds(bic_penalty(
-                    f.model.effect_parameter_count() - self.best.model.effect_parameter_count(),
-                    self.data.compared_block_count(),
-                ))
+                && likelihood_gain(&self.best, &f, &self.data)
+                    > bic_penalty(
+                        f.model.effect_parameter_count() - self.best.model.effect_parameter_count(),
+                        self.data.compared_block_count(),
+                    )
             {
                 self.accept(f);
             }
@@ -53,21 +53,16 @@ impl Search {
             if n < 2 {
                 return;
             }
-            let blocks = self.data.compared_block_count();
-            let reduced: Vec<(usize, Fit)> = (0..n)
+            let reduced: Vec<Fit> = (0..n)
                 .into_par_iter()
-                .filter_map(|k| Some((k, fit(&self.best.model.without_effect(k), &self.data, Effort::FULL)?)))
+                .filter_map(|k| fit(&self.best.model.without_effect(k), &self.data, Effort::FULL))
                 .collect();
             let surplus = |f: &Fit| {
-                let saved = bic_penalty(
-                    self.best.model.effect_parameter_count() - f.model.effect_parameter_count(),
-                    blocks,
-                ) + MIN_GAIN_NATS;
-                likelihood_gain(f, &self.best, &self.data) - saved
+                likelihood_gain(f, &self.best, &self.data) - required_gain_nats(f, &self.best, &self.data)
             };
-            let worst = reduced.into_iter().map(|(_, f)| (surplus(&f), f)).min_by(|a, b| a.0.total_cmp(&b.0));
+            let worst = reduced.into_iter().map(|f| (surplus(&f), f)).min_by(|a, b| a.0.total_cmp(&b.0));
             match worst {
-                Some((surplus, f)) if surplus < Nats::new(0.0) => self.accept(f),
+                Some((surplus, f)) if surplus < 0.0 => self.accept(f),
                 _ => return,
             }
         }
@@ -75,7 +70,6 @@ impl Search {
 }
 
 /// Gain (nats) required of the additional parameters of `larger`.
-#[must_use]
 pub fn required_gain_nats(smaller: &Fit, larger: &Fit, data: &FitData) -> f64 {
     let more = larger.model.effect_parameter_count().saturating_sub(smaller.model.effect_parameter_count());
     bic_penalty(more, data.compared_block_count()) + MIN_GAIN_NATS
@@ -83,9 +77,9 @@ pub fn required_gain_nats(smaller: &Fit, larger: &Fit, data: &FitData) -> f64 {
 
 /// Whether each strength of an effect is significant by itself; two terms that replace one could share its strength arbitrarily.
 pub(crate) fn strengths_are_determined(f: &Fit, which: usize, data: &FitData) -> bool {
-    let tangent = Linearization::new(&f.model, data, &f.residuals);
-    let variances = tangent.factor().inverse_diagonal();
-    tangent.shared.iter().zip(variances).all(|(n, variance)| match n.role {
+    let linearization = Linearization::new(&f.model, data, &f.residuals);
+    let variances = linearization.factor().inverse_diagonal();
+    linearization.shared.iter().zip(variances).all(|(n, variance)| match n.role {
         ParameterRole::Effect { effect, parameter } if effect == which => {
             let p = &f.model.effects[which].info.parameters[parameter];
             let off = f.model.effects[which].values[parameter] - p.inactive;
@@ -96,7 +90,6 @@ pub(crate) fn strengths_are_determined(f: &Fit, which: usize, data: &FitData) ->
 }
 
 /// Whether a parameter of an effect is at a bound.
-#[must_use]
 pub fn effect_at_bound(f: &Fit, which: usize) -> bool {
     f.model.shared_parameters().iter().any(|n| match n.role {
         ParameterRole::Effect { effect, .. } if effect == which => {

@@ -23,9 +23,8 @@ const MAX_HARMONIC: f64 = 20.0;
 const MAX_SUBHARMONIC: u32 = 4;
 
 /// Period (s) of a motion that is periodic over the recording; `None` otherwise.
-#[must_use]
 pub(crate) fn motion_period_s(b: &BlockAverages) -> Option<f64> {
-    let times: Vec<f64> = (0..b.len()).map(|k| 0.5 * (b.start_s[k] + b.end_s[k])).collect();
+    let times: Vec<f64> = (0..b.len()).map(|k| b.mid_s(k)).collect();
     let v: Vec<f64> = times.iter().map(|t| b.motion.at(*t).1).collect();
     let (low, high) =
         (quantile(&mut v.clone(), STROKE_QUANTILE), quantile(&mut v.clone(), 1.0 - STROKE_QUANTILE));
@@ -87,7 +86,6 @@ fn confounded_clock(f: &Fit, data: &FitData) -> Option<usize> {
 }
 
 /// Whether a fit has such an effect.
-#[must_use]
 pub(crate) fn has_confounded_clock(f: &Fit, data: &FitData) -> bool {
     confounded_clock(f, data).is_some()
 }
@@ -103,7 +101,6 @@ impl Search {
 }
 
 /// Shortest period (s) of the commanded motions; `None` unless all are periodic.
-#[must_use]
 pub(crate) fn common_motion_period_s(data: &FitData) -> Option<f64> {
     let periods: Option<Vec<f64>> = data.recordings.iter().map(motion_period_s).collect();
     range(&periods?).map(|p| p.0)

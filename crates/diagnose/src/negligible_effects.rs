@@ -25,7 +25,6 @@ const STRONG_NATS_PER_BLOCK: f64 = 0.3;
 /// Negligible causes with their reasons; `nats_against_zero` are the values of [`Covariance::nats_against_zero`] by effect.
 ///
 /// [`Covariance::nats_against_zero`]: crate::confidence_intervals::Covariance::nats_against_zero
-#[must_use]
 pub fn negligible_effects(
     search: &Search,
     extended_held_out: &[Option<FreeRunResidual>],

@@ -18,10 +18,9 @@ const MIN_NOISE_RATIO: f64 = 3.0;
 
 /// p-value of the most extreme segment in residuals `e` (N), `None` without one. A segment has consecutive window means of one sign above
 /// both ratios. The p-value is that of a normal mean of this size, times the number of windows.
-#[must_use]
 pub fn outlier_segment_p_value(data: &FitData, e: &[Vec<f64>]) -> Option<f64> {
     let of = |(b, e): (&BlockAverages, &Vec<f64>)| -> Vec<f64> {
-        let per = ((WINDOW_S / (b.sample_step_s * b.samples_per_block as f64)).round() as usize).max(1);
+        let per = ((WINDOW_S / b.block_s()).round() as usize).max(1);
         let mean = |from: usize| {
             let (mut sum, mut n) = (0.0, 0_usize);
             for k in (from..(from + per).min(b.len())).filter(|k| b.used[*k] && e[*k].is_finite()) {
@@ -39,8 +38,7 @@ pub fn outlier_segment_p_value(data: &FitData, e: &[Vec<f64>]) -> Option<f64> {
     let typical = (median(&mut sizes) * stylet_stats::MAD_TO_SD).max(MIN_NOISE_RATIO / MIN_TYPICAL_RATIO);
     // Smallest mean of a segment, relative to the typical one.
     let least = |w: &[f64]| {
-        let (low, high) =
-            w.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |r, m| (r.0.min(*m), r.1.max(*m)));
+        let (low, high) = stylet_stats::extremes(w);
         if w.iter().all(|m| m.is_finite()) { low.max(-high) / typical } else { 0.0 }
     };
     let most = means.iter().flat_map(|m| m.windows(SEGMENT_WINDOWS)).map(least).fold(0.0, f64::max);

@@ -8,7 +8,7 @@ use crate::confidence_intervals::{Covariance, interval_end_nats};
 use crate::diagnosis_json::{BaseParameter, Cause, LabelledParameter, ParameterLabel};
 use stylet_identify::fit::apply_step;
 use stylet_identify::likelihood::{FitData, residuals};
-use stylet_identify::model::{Model, Parameter, ParameterRole};
+use stylet_identify::model::{Model, ParameterRole};
 use stylet_stats::Z95;
 
 /// Share of the decrease at an interval end that the data must lose to bound the parameter; the prior provides the rest.
@@ -90,8 +90,7 @@ fn base_entries(covariance: &Covariance, base: &[BaseParameter]) -> Vec<Entry> {
     let tissue = &covariance.fit.model.tissue;
     let entry = |b: &BaseParameter| {
         let (role, scale) = base_role(&covariance.fit.model, b.layer, &b.name)?;
-        let mut gradient = vec![0.0; covariance.factor.size()];
-        gradient[covariance.index_of(role)?] = scale;
+        let gradient = covariance.shared_gradient(role, scale)?;
         let label = match (b.at_least, b.at_bound) {
             (true, _) => ParameterLabel::OneSided,
             (false, true) => ParameterLabel::AtBound,
@@ -137,19 +136,15 @@ fn effect_entries(covariance: &Covariance, causes: &[Cause]) -> Vec<Entry> {
 fn profile_label(covariance: &Covariance, data: &FitData, role: ParameterRole) -> ParameterLabel {
     let Some(i) = covariance.index_of(role) else { return ParameterLabel::Determined };
     let Some((_, half)) = covariance.shared_parameter(role) else { return ParameterLabel::Determined };
-    let mut unit = vec![0.0; covariance.factor.size()];
-    unit[i] = 1.0;
+    let Some(unit) = covariance.shared_gradient(role, 1.0) else { return ParameterLabel::Determined };
     let column = covariance.factor.solve(&unit);
     let follow: Vec<f64> = column.iter().map(|c| c / column[i].max(f64::MIN_POSITIVE)).collect();
-    let (fit, parameter) = (covariance.fit, &covariance.tangent.shared[i]);
-    let prior_nats = |n: &Parameter, x: f64| {
-        if n.prior_sd.is_finite() { 0.5 * ((x - n.prior_mean) / n.prior_sd).powi(2) } else { 0.0 }
-    };
+    let (fit, parameter) = (covariance.fit, &covariance.linearization.shared[i]);
     let is_closed = |side: f64| {
         let step: Vec<f64> = follow.iter().map(|f| f * side * half).collect();
-        let moved = apply_step(&fit.model, data, &covariance.tangent, &step, 1.0);
+        let moved = apply_step(&fit.model, data, &covariance.linearization, &step, 1.0);
         let by_prior =
-            prior_nats(parameter, moved.get(role, 0)) - prior_nats(parameter, fit.model.get(role, 0));
+            parameter.prior_nats(moved.get(role, 0)) - parameter.prior_nats(fit.model.get(role, 0));
         residuals(&moved, data)
             .is_none_or(|r| r.nats - fit.nats() - by_prior > MIN_DATA_SHARE * interval_end_nats())
     };

@@ -67,9 +67,7 @@ fn estimate(covariance: &Covariance, p: &LabelledParameter) -> Option<(f64, f64)
     let (role, gradient, value) = match &p.effect {
         None => {
             let (role, scale) = base_role(model, p.layer, &p.name)?;
-            let mut gradient = vec![0.0; covariance.factor.size()];
-            gradient[covariance.index_of(role)?] = scale;
-            (role, gradient, scale * model.get(role, 0))
+            (role, covariance.shared_gradient(role, scale)?, scale * model.get(role, 0))
         }
         Some(id) => {
             let effect = model.effects.iter().position(|e| e.info.id == id)?;
@@ -78,10 +76,8 @@ fn estimate(covariance: &Covariance, p: &LabelledParameter) -> Option<(f64, f64)
             (role, covariance.gradient(effect, parameter), model.effects[effect].values[parameter])
         }
     };
-    let shared = &covariance.tangent.shared[covariance.index_of(role)?];
-    let mut unit = vec![0.0; covariance.factor.size()];
-    unit[covariance.index_of(role)?] = 1.0;
-    let in_fit_scale = covariance.deviation(&unit).0;
+    let shared = &covariance.linearization.shared[covariance.index_of(role)?];
+    let in_fit_scale = covariance.deviation(&covariance.shared_gradient(role, 1.0)?).0;
     let sd = covariance.deviation(&gradient).0;
     let is_bounded = in_fit_scale.powi(2) <= MAX_PRIOR_SHARE * shared.prior_sd.powi(2);
     (is_bounded && sd > 0.0 && value.is_finite()).then_some((value, sd))

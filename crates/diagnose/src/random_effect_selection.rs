@@ -32,7 +32,6 @@ fn with_random_effects(model: &Model, own_surface: bool, own_friction: bool) -> 
 }
 
 /// Selects the random effects with the smallest penalised objective; the noise is then estimated again from the residual.
-#[must_use]
 pub fn select_random_effects(best: Fit, data: FitData) -> (Fit, FitData) {
     if data.recording_count() < 2 {
         return (best, data);
@@ -70,7 +69,8 @@ pub fn select_random_effects(best: Fit, data: FitData) -> (Fit, FitData) {
     } else {
         -likelihood_gain(&other, &best, &data)
     };
-    if !gained.exceeds(penalty) {
+    let is_better = gained > penalty;
+    if !is_better {
         return (best, data);
     }
     let data = data.with_estimated_noise(&other.residuals.residual_n, NoiseSource::Detrended);

@@ -2,7 +2,6 @@
 
 use crate::diagnose::DiagnosisResult;
 use crate::diagnosis_json::Verdict;
-use crate::held_out::predict_free_run;
 use stylet_identify::fit::Fit;
 use stylet_stats::linear_algebra::dot;
 use stylet_tissue::Slab;
@@ -22,8 +21,6 @@ pub struct RecordingCurves {
     pub base_residual_n: Vec<f64>,
     /// Residual (N) of the extended model, with ruptures at fitted times.
     pub extended_residual_n: Vec<f64>,
-    /// Residual (N) of the extended model, with ruptures at predicted times (free run).
-    pub free_run_residual_n: Vec<f64>,
     /// Whether the block is compared.
     pub used: Vec<bool>,
     /// Times in s at which layers ruptured.
@@ -48,12 +45,13 @@ pub fn reported_fit(examined: &DiagnosisResult) -> &Fit {
 pub fn recording_curves(examined: &DiagnosisResult) -> Vec<RecordingCurves> {
     let search = &examined.search;
     let best = reported_fit(examined);
-    let data = &search.data;
-    data.recordings
+    search
+        .data
+        .recordings
         .iter()
         .enumerate()
         .map(|(r, b)| {
-            let t: Vec<f64> = (0..b.len()).map(|k| 0.5 * (b.start_s[k] + b.end_s[k])).collect();
+            let t: Vec<f64> = (0..b.len()).map(|k| b.mid_s(k)).collect();
             let (position_m, velocity_mps) = t.iter().map(|t| b.motion.at(*t)).unzip();
             let ruptures = &best.model.rupture_times_s[r];
             // In retraction the tip comes back through the layers that it has passed.
@@ -65,8 +63,6 @@ pub fn recording_curves(examined: &DiagnosisResult) -> Vec<RecordingCurves> {
             };
             RecordingCurves {
                 force_n: b.force_n.clone(),
-                free_run_residual_n: predict_free_run(&best.model, data, r)
-                    .map_or_else(|| vec![f64::NAN; b.len()], |l| l.residual_n),
                 base_residual_n: search.base.residuals.residual_n[r].clone(),
                 extended_residual_n: best.residuals.residual_n[r].clone(),
                 used: b.used.clone(),
@@ -104,7 +100,7 @@ pub fn rms_by_layer_and_phase(
 /// Centres and means of a residual in equal bins of `x`, for bins with at least five values.
 #[must_use]
 pub fn binned_means(x: &[f64], e: &[f64], used: &[bool], bins: usize) -> (Vec<f64>, Vec<f64>) {
-    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+    let (low, high) = stylet_stats::extremes(x);
     let wide = (high - low) / bins as f64;
     if wide.is_nan() || wide <= 0.0 {
         return (Vec::new(), Vec::new());

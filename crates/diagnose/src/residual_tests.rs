@@ -90,7 +90,6 @@ fn bins(feature: usize, b: &BlockAverages, deepest: f64) -> Vec<usize> {
 }
 
 /// Tests the residual of a fit.
-#[must_use]
 pub fn test_residuals(fit: &Fit, data: &FitData) -> ResidualTests {
     let deepest =
         data.recordings.iter().flat_map(|b| b.pieces.iter()).fold(0.0_f64, |m, p| m.max(p.position_m));
@@ -292,7 +291,6 @@ fn covariance(part: &Part, total: &[(f64, f64)], kept: &[usize]) -> Vec<f64> {
 
 /// Upper tail probability at `z` of a standardised variable with this skewness: gamma distribution of equal skewness, by Wilson and
 /// Hilferty (1931), with a relative error of a quarter. A sum of few products has longer tails than a normal variable.
-#[must_use]
 pub fn skewed_tail(z: f64, skewness: f64) -> f64 {
     if skewness < 1e-6 {
         return tail(z);

@@ -16,7 +16,6 @@ const MIN_RESIDUAL_SD: f64 = 1.5;
 const ITERATIONS: usize = 4;
 
 /// Reweighted fit, and the data with the final weights.
-#[must_use]
 pub fn fit_reweighted(best: &Fit, data: &FitData) -> Option<(Fit, FitData)> {
     let mut f = best.clone();
     let mut weighted = data.clone();
@@ -37,7 +36,7 @@ fn reweighted_data(f: &Fit, data: &FitData) -> FitData {
 /// Standard deviation (N) of the residual around every block, scaled for its correlation; 0 if it does not exceed the noise by
 /// [`MIN_RESIDUAL_SD`].
 fn local_residual_sd(b: &BlockAverages, e: &[f64], data: &FitData) -> Vec<f64> {
-    let half = (HALF_WINDOW_S / (b.sample_step_s * b.samples_per_block as f64)).round().max(1.0) as usize;
+    let half = (HALF_WINDOW_S / b.block_s()).round().max(1.0) as usize;
     let square = |k: usize| if b.used[k] { (e[k] * e[k], 1.0) } else { (0.0, 0.0) };
     (0..b.len())
         .map(|k| {

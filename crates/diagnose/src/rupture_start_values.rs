@@ -21,7 +21,6 @@ const GRID_PASSES: usize = 3;
 const MAX_EVENT_NATS: f64 = 12.0;
 
 /// Best start value of a one-parameter effect from the ruptures; `None` when no strength improves their likelihood.
-#[must_use]
 pub fn start_from_ruptures(info: &'static EffectInfo, score_test: &ScoreTest) -> Option<EffectStart> {
     let [parameter] = info.parameters else { return None };
     let current = rupture_objective(score_test, score_test.fit.model.clone())?.0;

@@ -7,7 +7,6 @@ use stylet_identify::fit::{Effort, Fit, fit, fit_from_zero_scatter};
 use stylet_identify::likelihood::{FitData, residuals, with_break_uncertainty};
 use stylet_identify::model::EffectTerm;
 use stylet_identify::noise::NoiseSource;
-use stylet_stats::parallel::*;
 
 /// One step of the selection.
 #[derive(Clone, Debug)]
@@ -82,9 +81,7 @@ impl Search {
 
     /// The data on coarser blocks with the noise of the best fit, for ranking candidates.
     pub(crate) fn coarse(&self) -> FitData {
-        let coarse = self.data.with_recordings(
-            self.data.recordings.par_iter().map(|b| b.coarsened(COARSENING_FACTOR)).collect(),
-        );
+        let coarse = self.data.coarsened(COARSENING_FACTOR);
         let model = self.best.model.clone();
         let Some(residuals) = residuals(&model, &coarse) else { return coarse };
         with_noise_without_tones(&Fit { model, residuals }, &coarse, &self.tones_hz)

@@ -19,15 +19,7 @@ pub(crate) fn sensor_artefact_causes(raw: &SensorArtefacts, noise_n: f64) -> Vec
                 (p.path.to_owned(), Estimate { value, low: low.max(0.0), high: *high })
             })
             .collect();
-        causes.push(Cause {
-            effect: info.id.to_owned(),
-            equivalent: Vec::new(),
-            confidence: 0.99,
-            parameters,
-            gain_nats: 0.0,
-            share: 0.0,
-            ..Cause::default()
-        });
+        causes.push(Cause { effect: info.id.to_owned(), confidence: 0.99, parameters, ..Cause::default() });
     };
     let about = |value: f64, sd: f64| (value - Z95 * sd, value + Z95 * sd);
     if let Some(limit_n) = raw.limit_n {

@@ -26,22 +26,20 @@ pub fn residual_spectrum(fit: &Fit, data: &FitData) -> (Vec<f64>, Vec<f64>) {
     power(fit, data, 1).for_plot()
 }
 
-/// Block residuals (N) of a fit without tones at the frequencies `lines` (Hz), whose amplitude and phase are fitted per recording.
-#[must_use]
-pub fn remove_tones(fit: &Fit, data: &FitData, lines: &[f64]) -> Vec<Vec<f64>> {
+/// Block residuals (N) of a fit without tones at the frequencies `tones_hz`, whose amplitude and phase are fitted per recording.
+pub(crate) fn remove_tones(fit: &Fit, data: &FitData, tones_hz: &[f64]) -> Vec<Vec<f64>> {
     let mut e = fit.residuals.residual_n.clone();
     for (b, e) in data.recordings.iter().zip(&mut e) {
-        for hz in lines {
-            subtract_sinusoid(e, |k| 0.5 * (b.start_s[k] + b.end_s[k]), |k| b.used[k], *hz);
+        for hz in tones_hz {
+            subtract_sinusoid(e, |k| b.mid_s(k), |k| b.used[k], *hz);
         }
     }
     e
 }
 
 /// The data with the noise estimated from the residual without these tones (Hz), which an autoregression would absorb as coloured noise.
-#[must_use]
-pub fn with_noise_without_tones(fit: &Fit, data: &FitData, lines: &[f64]) -> FitData {
-    data.with_estimated_noise(&remove_tones(fit, data, lines), NoiseSource::Detrended)
+pub(crate) fn with_noise_without_tones(fit: &Fit, data: &FitData, tones_hz: &[f64]) -> FitData {
+    data.with_estimated_noise(&remove_tones(fit, data, tones_hz), NoiseSource::Detrended)
 }
 
 /// Frequencies (Hz) of the tones in the residual of a fit, strongest first.

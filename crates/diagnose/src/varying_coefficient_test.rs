@@ -38,7 +38,6 @@ pub struct VaryingCoefficient {
 
 /// First-order gain of a fit if the force of an effect may vary with a feature, for the feature with the largest gain; all fitted
 /// parameters adapt. `loss_nats` is the loss (nats) without the effect. `None` when its force cannot be computed.
-#[must_use]
 pub fn varying_coefficient_test(
     score_test: &ScoreTest<'_>,
     effect: usize,
@@ -72,7 +71,7 @@ fn features(b: &BlockAverages, predicted: &[f64]) -> [Vec<f64>; FEATURES.len()] 
     let mut out: [Vec<f64>; FEATURES.len()] = Default::default();
     let (mut before, mut sign, mut since_m) = (None, 0.0, 0.0);
     for (k, f) in predicted.iter().enumerate() {
-        let t = 0.5 * (b.start_s[k] + b.end_s[k]);
+        let t = b.mid_s(k);
         let (z, v) = b.motion.at(t);
         let (z0, v0) = before.replace((z, v)).unwrap_or((z, v));
         if sgn(v) * sign < 0.0 {

@@ -19,7 +19,6 @@ use crate::tone_detection::{detect_tones, with_noise_without_tones};
 use crate::varying_coefficient_test::{FEATURES, VaryingCoefficient, varying_coefficient_test};
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use std::cell::LazyCell;
-use std::collections::BTreeMap;
 use stylet_identify::fit::{Effort, Fit, fit};
 use stylet_identify::likelihood::{FitData, residuals};
 use stylet_identify::model::ParameterRole;
@@ -126,12 +125,10 @@ pub(crate) fn assess_search(search: &mut Search, competing: &[Vec<CompetingEffec
         Covariance::new(&with_slow_noise, &slow_data, &mut ChaCha8Rng::seed_from_u64(BOOTSTRAP_SEED));
     let (mut causes, mut nats_against_zero) = (Vec::new(), Vec::new());
     for (k, choice) in with_slow_noise.model.effects.iter().enumerate() {
-        let none = Vec::new();
-        let competing = competing.get(k).unwrap_or(&none);
-        let mut parameters = BTreeMap::new();
-        for (p, info) in choice.info.parameters.iter().enumerate() {
-            parameters.insert(info.path.to_owned(), covariance.effect_parameter(k, p));
-        }
+        let competing = competing.get(k).map_or(&[][..], Vec::as_slice);
+        let estimate = |p: usize| covariance.effect_parameter(k, p);
+        let paths = choice.info.parameters.iter().map(|p| p.path.to_owned());
+        let parameters = paths.enumerate().map(|(p, path)| (path, estimate(p))).collect();
         nats_against_zero
             .extend(covariance.nats_against_zero(k).map(|nats| (choice.info.id.to_owned(), nats)));
         let stage = search.stages.iter().rev().find(|s| s.selected.is_some_and(|t| t.0 == choice.info.id));

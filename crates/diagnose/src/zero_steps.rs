@@ -240,13 +240,7 @@ impl RecordedZero {
         } else {
             return None;
         };
-        Some(QualityNote {
-            kind: QualityKind::ZeroStep,
-            message,
-            numbers: numbers.into_iter().map(|(name, x)| (name.to_owned(), x)).collect(),
-            lines: Vec::new(),
-            blocking: false,
-        })
+        Some(QualityNote::new(QualityKind::ZeroStep, message, numbers))
     }
 }
 
@@ -312,7 +306,7 @@ fn cause(search: &Search, effect: &AnyEffect, half_widths: &[f64], removed: impl
         steps.retain(|s| !removed(s.time_s <= b.span_s().0));
     }
     let without_steps = fit(&without, data, Effort::FULL);
-    let gain_nats = without_steps.as_ref().map_or(0.0, |f| likelihood_gain(f, &search.best, data).value());
+    let gain_nats = without_steps.as_ref().map_or(0.0, |f| likelihood_gain(f, &search.best, data));
     let share = without_steps.map_or(0.0, |f| {
         let (noise_n, after_n, before_n) = (sample_noise_sd_n(data), search.best.rms_n(data), f.rms_n(data));
         (before_n * before_n - after_n * after_n) / (before_n * before_n - noise_n * noise_n).max(1e-12)
@@ -323,7 +317,6 @@ fn cause(search: &Search, effect: &AnyEffect, half_widths: &[f64], removed: impl
     let estimate = |value: f64, half: f64| Estimate { value, low: value - half, high: value + half };
     Cause {
         effect: effect.id().to_owned(),
-        equivalent: Vec::new(),
         confidence: confidence(gain_nats - needed, 0.0),
         parameters: parameters
             .map(|((p, value), half)| (p.path.to_owned(), estimate(value, *half)))

@@ -23,7 +23,7 @@ const JUMP_MARGIN_STEPS: f64 = 0.03;
 const FORCE_SMOOTHING_S: f64 = 0.1;
 
 /// One recording in blocks.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct BlockAverages {
     /// Start of every block in s.
     pub start_s: Vec<f64>,
@@ -93,23 +93,12 @@ impl BlockAverages {
         let t = &recording.time_s;
         let n = t.len();
         let mut b = Self {
-            start_s: Vec::new(),
-            end_s: Vec::new(),
-            force_n: Vec::new(),
-            used: Vec::new(),
-            memory_reset: Vec::new(),
-            abs_force_n: Vec::new(),
-            extra_sd_n: Vec::new(),
-            unmodelled_sd_n: Vec::new(),
-            break_times_s: Vec::new(),
             sample_time_s: Arc::new(recording.time_s.clone()),
             sample_force_n: Arc::new(recording.force_n.clone()),
-            sample_block: Arc::default(),
             samples_per_block: q,
             sample_step_s: step_s,
             motion,
-            pieces: Arc::default(),
-            exact_pieces: Arc::default(),
+            ..Self::default()
         };
         let mut i = 0;
         let mut raw_block = Vec::with_capacity(n);
@@ -120,11 +109,8 @@ impl BlockAverages {
                 let missing = gap > GAP_STEPS * step_s
                     && gap <= (q as f64 * MAX_MISSING_BLOCKS + 0.8) * step_s
                     && q > 1;
-                (gap <= GAP_STEPS * step_s || missing).then_some(if missing {
-                    (gap / step_s).round() as usize
-                } else {
-                    1
-                })
+                let steps = if missing { (gap / step_s).round() as usize } else { 1 };
+                (gap <= GAP_STEPS * step_s || missing).then_some(steps)
             };
             let begun_s = b.end_s.last().copied().filter(|_| i > 0 && spans(i).is_some_and(|s| s > 1));
             let mut places = begun_s.map_or(1, |s| ((t[i] - s) / step_s + 0.5).round().max(1.0) as usize);
@@ -239,8 +225,7 @@ impl BlockAverages {
         self.memory_reset = (0..n)
             .map(|k| k == 0 || !self.used[k - 1] || self.start_s[k] - self.end_s[k - 1] > self.sample_step_s)
             .collect();
-        let length_s = self.sample_step_s * self.samples_per_block as f64;
-        let half = ((0.5 * FORCE_SMOOTHING_S / length_s).round() as usize).max(1);
+        let half = ((0.5 * FORCE_SMOOTHING_S / self.block_s()).round() as usize).max(1);
         self.abs_force_n = (0..n)
             .map(|k| {
                 let (lo, hi) = (k.saturating_sub(half), (k + half + 1).min(n));
@@ -253,8 +238,7 @@ impl BlockAverages {
 
     /// The same blocks with the times (s) at which an elastic element breaks. Each adds to `extra_sd_n`, because a break is located only to
     /// within a sampling interval.
-    #[must_use]
-    pub fn with_break_times(mut self, falls_s: Vec<f64>) -> Self {
+    pub(crate) fn with_break_times(mut self, falls_s: Vec<f64>) -> Self {
         self.break_times_s = falls_s;
         self.update_extra_sd();
         self
@@ -295,8 +279,7 @@ impl BlockAverages {
 
     /// The same blocks for a force delayed by `delay_s`: jumps are delayed too, and one whose timing uncertainty spans a sample makes the
     /// block means on both sides uncertain.
-    #[must_use]
-    pub fn with_delayed_jump_uncertainty(&self, delay_s: f64) -> Self {
+    pub(crate) fn with_delayed_jump_uncertainty(&self, delay_s: f64) -> Self {
         let mut b = self.clone();
         b.update_extra_sd();
         for jump in &self.motion.jumps {
@@ -425,6 +408,24 @@ impl BlockAverages {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.start_s.is_empty()
+    }
+
+    /// Nominal length of a block in s.
+    #[must_use]
+    pub fn block_s(&self) -> f64 {
+        self.sample_step_s * self.samples_per_block as f64
+    }
+
+    /// Middle of a block in s.
+    #[must_use]
+    pub fn mid_s(&self, k: usize) -> f64 {
+        0.5 * (self.start_s[k] + self.end_s[k])
+    }
+
+    /// Number of blocks that enter the likelihood.
+    #[must_use]
+    pub fn compared_block_count(&self) -> usize {
+        self.used.iter().filter(|u| **u).count()
     }
 
     /// Index of the block that contains a time, or of the next one.

@@ -33,7 +33,7 @@ pub fn discrepancy_noise(blocks: &[BlockAverages], e: &[Vec<f64>], floor_n: f64)
         }
     }
     let variance = square / f64::max(n, 1.0);
-    let block_s = blocks.first().map_or(1.0, |b| b.sample_step_s * b.samples_per_block as f64).max(1e-6);
+    let block_s = blocks.first().map_or(1.0, BlockAverages::block_s).max(1e-6);
     let mut time = 1.0;
     for lag in 1..((MAX_LAG_S / block_s) as usize).max(2) {
         let (mut sum, mut pairs) = (0.0, 0.0);

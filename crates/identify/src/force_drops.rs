@@ -33,10 +33,9 @@ const REGRESSORS: usize = 6;
 /// Force drops of a recording, in order of time.
 #[must_use]
 pub fn detect_force_drops(b: &BlockAverages) -> Vec<ForceDrop> {
-    let length_s = b.sample_step_s * b.samples_per_block as f64;
+    let length_s = b.block_s();
     let mut found: Vec<ForceDrop> = Vec::new();
-    let motion: Vec<(f64, f64)> =
-        (0..b.len()).map(|k| b.motion.at(0.5 * (b.start_s[k] + b.end_s[k]))).collect();
+    let motion: Vec<(f64, f64)> = (0..b.len()).map(|k| b.motion.at(b.mid_s(k))).collect();
     for window_s in WINDOWS_S {
         let half = ((window_s / length_s).round() as usize).max(6);
         for drop in score_peaks(b, &motion, half) {
@@ -75,7 +74,7 @@ fn score_peaks(b: &BlockAverages, motion: &[(f64, f64)], half: usize) -> Vec<For
                 && (lo..hi).all(|j| if j < k { scores[j] < scores[k] } else { scores[j] <= scores[k] })
         })
         .map(|k| ForceDrop {
-            time_s: 0.5 * (b.start_s[k] + b.end_s[k]),
+            time_s: b.mid_s(k),
             position_m: motion[k].0,
             size_n: -steps[k].0,
             score: scores[k],

@@ -64,7 +64,7 @@ pub fn noise_n(force_n: &[f64]) -> f64 {
 #[must_use]
 pub fn detect_phases(recording: &Recording) -> InsertionPhases {
     let z = &recording.position_m;
-    let (low, high) = z.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(*z), h.max(*z)));
+    let (low, high) = stylet_stats::extremes(z);
     let near = (0.005 * (high - low)).min(1e-4);
     let start = z.iter().position(|x| *x > z[0] + 0.5 * near).unwrap_or(0);
     let deepest = z.iter().position(|x| *x > high - near).unwrap_or(z.len() - 1);

@@ -7,7 +7,7 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`motion`] | base motion between samples: position, velocity, velocity jumps |
+//! | `motion` | base motion between samples: position, velocity, velocity jumps |
 //! | [`block_averages`] | means of a recording over blocks of 20 ms |
 //! | [`insertion_phases`], [`force_drops`] | motion phases and abrupt force changes; force drops by local regression |
 //! | [`force_jumps`] | jumps of either sign between two samples |
@@ -20,14 +20,12 @@
 //! | [`likelihood`], [`fit`], [`update_event_times`] | log posterior, damped least squares, search over rupture times |
 //! | [`delay_refinement`] | estimate of a force delay to a fraction of the sampling interval |
 //! | [`score_test`] | first-order gain of additional effects |
-//! | [`evidence_nats`] | evidence differences, typed by the noise they were computed with |
 #![forbid(unsafe_code)]
 #![allow(clippy::needless_range_loop, reason = "several columns of one recording share the index")]
 
 pub mod block_averages;
 pub mod delay_refinement;
 pub mod discrepancy_noise;
-pub mod evidence_nats;
 pub mod fit;
 pub mod force_drops;
 pub mod force_jumps;
@@ -35,7 +33,7 @@ pub mod forward_model;
 pub mod insertion_phases;
 pub mod likelihood;
 pub mod model;
-pub mod motion;
+mod motion;
 pub mod noise;
 pub mod rupture_assignment;
 pub mod rupture_likelihood;

@@ -4,7 +4,7 @@ use crate::block_averages::BlockAverages;
 use crate::forward_model::{
     IncrementalReplay, ReplayResult, break_times, free_rupture_times, replay_with_ruptures,
 };
-use crate::model::{CompiledModel, Model, NO_RUPTURE, Parameter};
+use crate::model::{CompiledModel, Model, NO_RUPTURE};
 use crate::motion::MotionPiece;
 use crate::noise::{Noise, NoiseSource, WhiteningPlan, huber_loss};
 use crate::rupture_likelihood::{RuptureEvent, evaluate_rupture};
@@ -96,10 +96,16 @@ impl FitData {
         Self { recordings: Arc::new(blocks), plans: Arc::default(), ..self.clone() }
     }
 
+    /// The same recordings in blocks `m` times as long.
+    #[must_use]
+    pub fn coarsened(&self, m: usize) -> Self {
+        self.with_recordings(self.recordings.par_iter().map(|b| b.coarsened(m)).collect())
+    }
+
     /// Number of compared blocks.
     #[must_use]
     pub fn compared_block_count(&self) -> usize {
-        self.recordings.iter().map(|b| b.used.iter().filter(|u| **u).count()).sum()
+        self.recordings.iter().map(BlockAverages::compared_block_count).sum()
     }
 
     /// Number of recordings.
@@ -245,31 +251,26 @@ pub fn residuals(model: &Model, data: &FitData) -> Option<Residuals> {
 }
 
 /// Negative log posterior in nats of given residuals.
-#[must_use]
-pub fn neg_log_posterior(model: &Model, r: &Residuals) -> f64 {
+pub(crate) fn neg_log_posterior(model: &Model, r: &Residuals) -> f64 {
     let mut sum: f64 = r.innovations.iter().map(|w| w.iter().map(|w| huber_loss(*w)).sum::<f64>()).sum();
     sum += rupture_nats(model, r);
     sum + prior_nats(model)
 }
 
 /// Rupture terms of the objective, in nats.
-#[must_use]
-pub fn rupture_nats(model: &Model, r: &Residuals) -> f64 {
+fn rupture_nats(model: &Model, r: &Residuals) -> f64 {
     r.ruptures.iter().flatten().map(|e| evaluate_rupture(e, &model.scatter).nats).sum()
 }
 
 /// Prior terms of the objective, in nats.
 #[must_use]
 pub fn prior_nats(model: &Model) -> f64 {
-    let of = |n: &Parameter, x: f64| {
-        if n.prior_sd.is_finite() { 0.5 * ((x - n.prior_mean) / n.prior_sd).powi(2) } else { 0.0 }
-    };
-    let shared: f64 = model.shared_parameters().iter().map(|n| of(n, model.get(n.role, 0))).sum();
+    let shared: f64 = model.shared_parameters().iter().map(|n| n.prior_nats(model.get(n.role, 0))).sum();
     let per_recording: f64 = model
         .recording_parameters()
         .iter()
         .filter(|n| n.prior_sd.is_finite())
-        .map(|n| (0..model.per_recording.len()).map(|r| of(n, model.get(n.role, r))).sum::<f64>())
+        .map(|n| (0..model.per_recording.len()).map(|r| n.prior_nats(model.get(n.role, r))).sum::<f64>())
         .sum();
     shared + per_recording
 }

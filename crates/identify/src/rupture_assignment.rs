@@ -100,11 +100,9 @@ fn assign_one_recording(
     drops: &[ForceDrop],
     noise_n: f64,
 ) -> Vec<f64> {
-    let z: Vec<f64> = (0..b.len()).map(|k| b.motion.at(0.5 * (b.start_s[k] + b.end_s[k])).0).collect();
+    let z: Vec<f64> = (0..b.len()).map(|k| b.motion.at(b.mid_s(k)).0).collect();
     let deepest = z.iter().fold(f64::NEG_INFINITY, |m, z| m.max(*z));
-    let crossing = |place: f64| {
-        z.iter().position(|z| *z >= place).map_or(NO_RUPTURE, |k| 0.5 * (b.start_s[k] + b.end_s[k]))
-    };
+    let crossing = |place: f64| z.iter().position(|z| *z >= place).map_or(NO_RUPTURE, |k| b.mid_s(k));
     let mut so_far = f64::NEG_INFINITY;
     let reached: Vec<f64> = z
         .iter()

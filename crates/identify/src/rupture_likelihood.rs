@@ -104,62 +104,46 @@ pub fn evaluate_rupture(event: &RuptureEvent, scatter: &Scatter) -> RuptureLikel
     let has_force = event.has_puncture_force();
     let (u_f, u_z) = (event.force_excess / s_f, event.depth_excess_m.max(-1e3) / s_z);
     if !event.ruptured {
-        let (by_force, by_place) = (if has_force { neg_ln_survival(u_f) } else { 0.0 }, neg_ln_survival(u_z));
-        return RuptureLikelihood {
-            rows: [0.0, 0.0, deviance_residual(by_place), deviance_residual(by_force)],
-            nats: by_force + by_place,
-            shares: [0.0; 2],
-        };
+        let by_force = if has_force { neg_ln_survival(u_f) } else { 0.0 };
+        let shares = [0.0; 2];
+        let nats = by_force + neg_ln_survival(u_z);
+        return RuptureLikelihood { rows: rows(event, u_f, u_z, shares), nats, shares };
     }
     let h = event.sample_step_s.max(1e-6);
     let rate_f = event.force_excess_rate.max(MIN_RATE_MPS / 0.01);
     let rate_z = event.depth_rate_mps.max(MIN_RATE_MPS);
     let b = ln_phi(u_z) + libm::log(rate_z * h / s_z) - if has_force { neg_ln_survival(u_f) } else { 0.0 };
     if !has_force {
-        return RuptureLikelihood { rows: rows(0.0, u_z, [0.0, 1.0], false), nats: -b, shares: [0.0, 1.0] };
+        let shares = [0.0, 1.0];
+        return RuptureLikelihood { rows: rows(event, u_f, u_z, shares), nats: -b, shares };
     }
     let a = ln_phi(u_f) + libm::log(rate_f * h / s_f) - neg_ln_survival(u_z);
     let most = a.max(b);
     let total = most + libm::log(libm::exp(a - most) + libm::exp(b - most));
     let shares = [libm::exp(0.5 * (a - total)), libm::exp(0.5 * (b - total))];
-    RuptureLikelihood { rows: rows(u_f, u_z, shares, true), nats: -total, shares }
+    RuptureLikelihood { rows: rows(event, u_f, u_z, shares), nats: -total, shares }
 }
 
 /// Residual rows of `event` with the risk shares and standard deviations of `at` held constant, for derivatives.
-#[must_use]
-pub fn rupture_rows_at(event: &RuptureEvent, scatter: &Scatter, at: &RuptureEvent) -> [f64; 4] {
+pub(crate) fn rupture_rows_at(event: &RuptureEvent, scatter: &Scatter, at: &RuptureEvent) -> [f64; 4] {
     let (s_f, s_z) = rupture_sds(at, scatter);
-    let [w_f, w_z] = evaluate_rupture(at, scatter).shares;
-    let has_force = at.has_puncture_force();
     let (u_f, u_z) = (event.force_excess / s_f, event.depth_excess_m.max(-1e3) / s_z);
-    if at.ruptured {
-        rows(u_f, u_z, [w_f, w_z], has_force)
-    } else {
-        [
-            0.0,
-            0.0,
-            deviance_residual(neg_ln_survival(u_z)),
-            if has_force { deviance_residual(neg_ln_survival(u_f)) } else { 0.0 },
-        ]
-    }
+    rows(at, u_f, u_z, evaluate_rupture(at, scatter).shares)
 }
 
-fn rows(u_f: f64, u_z: f64, [w_f, w_z]: [f64; 2], has_force: bool) -> [f64; 4] {
-    if has_force {
-        [
-            w_f * u_f,
-            w_z * u_z,
-            w_f * deviance_residual(neg_ln_survival(u_z)),
-            w_z * deviance_residual(neg_ln_survival(u_f)),
-        ]
-    } else {
-        [0.0, w_z * u_z, 0.0, 0.0]
+/// Residual rows for the standardised excesses, with the risks of `at` and their shares.
+fn rows(at: &RuptureEvent, u_f: f64, u_z: f64, [w_f, w_z]: [f64; 2]) -> [f64; 4] {
+    let survival = |u: f64| deviance_residual(neg_ln_survival(u));
+    match (at.ruptured, at.has_puncture_force()) {
+        (true, true) => [w_f * u_f, w_z * u_z, w_f * survival(u_z), w_z * survival(u_f)],
+        (true, false) => [0.0, w_z * u_z, 0.0, 0.0],
+        (false, true) => [0.0, 0.0, survival(u_z), survival(u_f)],
+        (false, false) => [0.0, 0.0, survival(u_z), 0.0],
     }
 }
 
 /// Scatter of force and depth with the highest posterior, by alternating grid searches.
-#[must_use]
-pub fn estimate_rupture_scatter(events: &[RuptureEvent], start: &Scatter) -> Scatter {
+pub(crate) fn estimate_rupture_scatter(events: &[RuptureEvent], start: &Scatter) -> Scatter {
     let mut best = *start;
     let nats = |s: &Scatter| -> f64 {
         events.iter().map(|e| evaluate_rupture(e, s).nats).sum::<f64>() + scatter_prior_nats(s)

@@ -29,7 +29,7 @@ fn update_one_recording(model: &Model, data: &FitData, r: usize, drops: &[f64]) 
     let mut rupture_times = model.rupture_times_s[r].clone();
     let Some(mut cache) = ReplayCache::new(model, data, r) else { return (rupture_times, false) };
     let b = &data.recordings[r];
-    let block_s = b.sample_step_s * b.samples_per_block as f64;
+    let block_s = b.block_s();
     let (first, last) = b.span_s();
     let law_times = cache.free_rupture_times();
     let mut best = cache.nats_with_ruptures(model, data, r, &rupture_times);

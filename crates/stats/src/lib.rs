@@ -10,6 +10,7 @@
 //! | [`moments`] | mean, variance, RMS |
 //! | [`robust_loss`] | Huber loss and weight |
 //! | [`robust_linear_prediction`] | linear prediction by robust least squares |
+//! | [`golden_section`](mod@golden_section) | minimum of a function of one variable |
 //! | [`least_squares`] | linear least squares by normal equations |
 //! | [`linear_algebra`] | small dense matrices: Cholesky factor, scalar product |
 //! | [`spectrum`] | power spectrum of evenly sampled signals, detection of tones |
@@ -22,6 +23,7 @@
 //! the median of an empty slice, a quantile at a probability outside 0 to 1.
 
 pub mod confidence_interval;
+pub mod golden_section;
 pub mod interpolation;
 pub mod least_squares;
 pub mod linear_algebra;
@@ -39,6 +41,7 @@ pub mod streaming_quantiles;
 pub mod student_t;
 
 pub use confidence_interval::{Interval, mean_interval, wilson, wilson_at};
+pub use golden_section::golden_section;
 pub use interpolation::interpolate;
 pub use moments::{UNIFORM_SD, mean, rms, sd, variance};
 pub use normal::Z95;

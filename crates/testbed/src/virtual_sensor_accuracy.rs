@@ -26,25 +26,9 @@ impl VirtualSensorAccuracy {
         }
         let rms = |lag_s: f64| lagged_rms(sensed, real, dt_s, lag_s);
         // Golden-section search over the logarithm of the lag, from a hundredth of a sample to a minute.
-        let (mut low, mut high) = (libm::log(0.01 * dt_s), libm::log(60.0));
-        let golden = 0.618_033_988_749_894_9;
-        let inner = |low: f64, high: f64| (high - golden * (high - low), low + golden * (high - low));
-        let (mut a, mut b) = inner(low, high);
-        let (mut rms_a, mut rms_b) = (rms(libm::exp(a)), rms(libm::exp(b)));
-        for _ in 0..60 {
-            if rms_a < rms_b {
-                high = b;
-                (b, rms_b) = (a, rms_a);
-                a = inner(low, high).0;
-                rms_a = rms(libm::exp(a));
-            } else {
-                low = a;
-                (a, rms_a) = (b, rms_b);
-                b = inner(low, high).1;
-                rms_b = rms(libm::exp(b));
-            }
-        }
-        let lag_s = libm::exp((low + high) / 2.0);
+        let of_ln_lag = |ln_lag: f64| rms(libm::exp(ln_lag));
+        let lag_s =
+            libm::exp(stylet_stats::golden_section(of_ln_lag, (libm::log(0.01 * dt_s), libm::log(60.0)), 60));
         Some(Self { lag_s, rms_n: rms(0.0), lag_corrected_rms_n: rms(lag_s) })
     }
 }

@@ -170,10 +170,10 @@ fn kink_position_is_as_certain_as_the_noise_allows() {
         noise.bins[0].ar[0] = slow;
         data = data.with_noise(noise);
         let estimated = fit(&model, &data, Effort::FULL).expect("a fit");
-        let tangent = Linearization::new(&estimated.model, &data, &estimated.residuals);
-        let at = tangent.shared.iter().position(|n| n.role == ParameterRole::Surface).expect("free");
+        let linearization = Linearization::new(&estimated.model, &data, &estimated.residuals);
+        let at = linearization.shared.iter().position(|n| n.role == ParameterRole::Surface).expect("free");
         let by_derivative =
-            CALIBRATION_FACTOR * stylet_stats::Z95 * tangent.factor().inverse_diagonal()[at].sqrt();
+            CALIBRATION_FACTOR * stylet_stats::Z95 * linearization.factor().inverse_diagonal()[at].sqrt();
         let (_, half) = Covariance::with_known_noise(&estimated, &data)
             .shared_parameter(ParameterRole::Surface)
             .expect("free");
@@ -190,7 +190,7 @@ fn degrees_of_freedom_follow_welch_and_satterthwaite() {
     let estimated = fit(&model, &data, Effort { max_iterations: 1, min_gain_nats: 1.0 }).expect("a fit");
     let of = |raised: &[(f64, f64)], bootstrap: &[f64]| {
         let with_known_noise = Covariance::with_known_noise(&estimated, &data);
-        let size = with_known_noise.tangent.normal_matrix.size;
+        let size = with_known_noise.linearization.normal_matrix.size;
         // Equal variances for all parameters.
         let even = |variance: f64| {
             let mut m = SymmetricMatrix::zeros(size);

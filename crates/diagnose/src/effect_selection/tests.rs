@@ -326,7 +326,7 @@ fn effect_stays_when_it_gains_four_nats_more_than_its_penalty() {
         let (mut search, _) = search_over(&[], &[drift(0.02), bias], |t| 0.02 * t + bias_n);
         let less =
             stylet_identify::fit::fit(&search.best.model.without_effect(1), &search.data, Effort::FULL);
-        let gained = likelihood_gain(&less.expect("a fit"), &search.best, &search.data).value();
+        let gained = likelihood_gain(&less.expect("a fit"), &search.best, &search.data);
         let wanted = 0.5 * (search.data.compared_block_count() as f64).ln() + 4.0;
         search.prune();
         let stays = search.best.model.effects.len() == 2;

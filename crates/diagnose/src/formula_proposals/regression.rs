@@ -1,6 +1,6 @@
 //! Linear regression of the residual of a fit, judged on recordings that were left out.
 
-use stylet_identify::fit::{Fit, JacobianColumn};
+use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::FitData;
 use stylet_identify::score_test::ScoreTest;
 use stylet_stats::linear_algebra::{SymmetricMatrix, dot};
@@ -32,14 +32,9 @@ impl<'a> Regression<'a> {
         Self { score_test: ScoreTest::new(fit, data) }
     }
 
-    /// The column of a force (N) per block.
+    /// The column of a force (N) per block: the part that no change of the fitted parameters predicts.
     pub fn column(&self, force_n: &[Vec<f64>]) -> Column {
-        let column = self.score_test.force_column(force_n);
-        self.projected(column).innovations
-    }
-
-    /// The part of a column that no change of the fitted parameters predicts.
-    fn projected(&self, mut column: JacobianColumn) -> JacobianColumn {
+        let mut column = self.score_test.force_column(force_n);
         let at = &self.score_test.linearization;
         let change = self.score_test.parameter_change(&column);
         let shared = at.shared.len();
@@ -52,7 +47,7 @@ impl<'a> Regression<'a> {
                 w.iter_mut().zip(derivative).for_each(|(w, d)| *w -= change[index] * d);
             }
         }
-        column
+        column.innovations
     }
 
     /// Regresses the residual on columns.

@@ -25,25 +25,24 @@ impl Variable {
     pub const ALL: [Self; 6] =
         [Self::Time, Self::Position, Self::Velocity, Self::Acceleration, Self::Travel, Self::Path];
 
-    /// Name in formulas.
-    pub const fn name(self) -> &'static str {
+    /// Name in formulas, dimensions, and value at a sample.
+    const fn properties(self) -> (&'static str, Dimensions, fn(&Sample) -> f64) {
         match self {
-            Self::Time => "t",
-            Self::Position => "z",
-            Self::Velocity => "v",
-            Self::Acceleration => "a",
-            Self::Travel => "travel",
-            Self::Path => "path",
+            Self::Time => ("t", [0, 0, 1], |s| s.time_s),
+            Self::Position => ("z", [0, 1, 0], |s| s.z_m),
+            Self::Velocity => ("v", [0, 1, -1], |s| s.v_mps),
+            Self::Acceleration => ("a", [0, 1, -2], |s| s.a_mps2),
+            Self::Travel => ("travel", [0, 1, 0], |s| s.travel_m),
+            Self::Path => ("path", [0, 1, 0], |s| s.path_m),
         }
     }
 
+    pub const fn name(self) -> &'static str {
+        self.properties().0
+    }
+
     const fn dimensions(self) -> Dimensions {
-        match self {
-            Self::Time => [0, 0, 1],
-            Self::Position | Self::Travel | Self::Path => [0, 1, 0],
-            Self::Velocity => [0, 1, -1],
-            Self::Acceleration => [0, 1, -2],
-        }
+        self.properties().1
     }
 
     /// Unit, for plots.
@@ -52,14 +51,7 @@ impl Variable {
     }
 
     fn of(self, s: &Sample) -> f64 {
-        match self {
-            Self::Time => s.time_s,
-            Self::Position => s.z_m,
-            Self::Velocity => s.v_mps,
-            Self::Acceleration => s.a_mps2,
-            Self::Travel => s.travel_m,
-            Self::Path => s.path_m,
-        }
+        self.properties().2(s)
     }
 }
 
@@ -125,7 +117,7 @@ impl Sample {
         let mut before: Option<Self> = None;
         (0..b.len())
             .map(|k| {
-                let time_s = 0.5 * (b.start_s[k] + b.end_s[k]);
+                let time_s = b.mid_s(k);
                 let (z_m, v_mps) = b.motion.at(time_s);
                 let (mut a_mps2, mut moved_m) = (0.0, 0.0);
                 if let Some(before) = before {

@@ -84,13 +84,11 @@ pub const RECORDING_SD: Values = [0.2e-3, 0.03, 0.05, 0.1];
 pub const RATE_EXPONENT_SD: f64 = 0.1;
 
 /// Standard deviations of an unseen group that differs in the factors `varying`.
-#[must_use]
 pub fn group_sd(varying: &[Factor]) -> Values {
     std::array::from_fn(|k| varying.iter().map(|f| f.sd()[k].powi(2)).sum::<f64>().sqrt())
 }
 
 /// Model of recording `r` in a group with this deviation; the factor of all forces is applied to the predicted force instead.
-#[must_use]
 pub fn deviating_model(model: &Model, r: usize, deviation: &Values) -> Model {
     let [surface_m, _, ln_friction, ln_puncture] = *deviation;
     let mut out = model.clone();

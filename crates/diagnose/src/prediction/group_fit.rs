@@ -1,16 +1,14 @@
 //! Estimates the deviations of a group's recordings, and the prediction errors with a deviation.
 
-use super::group_deviation::{Factor, PARAMETERS, RECORDING_SD, Refit, Values, group_sd};
+use super::group_deviation::{Factor, PARAMETERS, RECORDING_SD, Refit, Values};
 use super::group_update::{GroupInformation, Observation, RecordingEstimate, estimate_recording};
 use super::prepared::Prepared;
-use super::target::{Target, with_unseen_speed};
-use super::training_curves::TrainingSummary;
+use super::target::Target;
 use stylet_stats::parallel::*;
 
 /// Recordings of a group with their estimated deviations from the model.
 pub struct GroupFit<'a> {
-    prepared: &'a Prepared,
-    training: Option<&'a TrainingSummary>,
+    prepared: &'a Prepared<'a>,
     targets: &'a [Target],
     /// Indices of the recordings.
     pub recordings: Vec<usize>,
@@ -23,8 +21,7 @@ pub struct GroupFit<'a> {
 impl<'a> GroupFit<'a> {
     /// Estimates the deviations of `recordings` in `parameters`; the groups differ in the factors `varying`.
     pub fn new(
-        prepared: &'a Prepared,
-        training: Option<&'a TrainingSummary>,
+        prepared: &'a Prepared<'a>,
         targets: &'a [Target],
         parameters: &[Refit],
         varying: &[Factor],
@@ -32,11 +29,11 @@ impl<'a> GroupFit<'a> {
     ) -> Option<Self> {
         let wide = recordings
             .iter()
-            .map(|r| with_unseen_speed(group_sd(varying), prepared, training, *r))
+            .map(|r| prepared.group_sd(varying, *r))
             .fold([0.0; PARAMETERS], |a, b| std::array::from_fn(|k| f64::max(a[k], b[k])));
         let is_free = |k: usize| parameters.contains(&Refit::ALL[k]);
         let group_sd: Values = std::array::from_fn(|k| if is_free(k) { wide[k] } else { 0.0 });
-        let recording_sd = training.map_or(RECORDING_SD, |t| t.recording_sd);
+        let recording_sd = prepared.training.map_or(RECORDING_SD, |t| t.recording_sd);
         // The deviation of a recording is that of its group plus its own.
         let prior_sd: Values = std::array::from_fn(|k| {
             if group_sd[k] > 0.0 { libm::hypot(group_sd[k], recording_sd[k]) } else { 0.0 }
@@ -46,20 +43,12 @@ impl<'a> GroupFit<'a> {
             .map(|r| {
                 let b = &prepared.data.recordings[*r];
                 let observed =
-                    Observation { force_n: &b.force_n, used: &b.used, weight: prepared.weight(training, *r) };
-                let force = |u: &Values| prepared.force(training, *r, u, &targets[*r].mean_residual);
+                    Observation { force_n: &b.force_n, used: &b.used, weight: prepared.weight(*r) };
+                let force = |u: &Values| prepared.force(*r, u, &targets[*r].mean_residual);
                 estimate_recording(&observed, force, prior_sd)
             })
             .collect::<Option<_>>()?;
-        Some(Self {
-            prepared,
-            training,
-            targets,
-            recordings: recordings.to_vec(),
-            estimates,
-            group_sd,
-            recording_sd,
-        })
+        Some(Self { prepared, targets, recordings: recordings.to_vec(), estimates, group_sd, recording_sd })
     }
 
     /// Information of all recordings but `except`.
@@ -86,7 +75,7 @@ impl<'a> GroupFit<'a> {
     /// Sum of squared errors (N²) of recording `r` and its number of blocks.
     fn error(&self, r: usize, deviation: &Values) -> Option<(f64, f64)> {
         let b = &self.prepared.data.recordings[r];
-        let force = self.prepared.force(self.training, r, deviation, &self.targets[r].mean_residual)?;
+        let force = self.prepared.force(r, deviation, &self.targets[r].mean_residual)?;
         let used = b.force_n.iter().zip(&force).zip(&b.used).filter(|(_, used)| **used);
         Some(used.fold((0.0, 0.0), |(s, n), ((y, f), _)| (s + (y - f).powi(2), n + 1.0)))
     }

@@ -206,13 +206,11 @@ pub struct GroupInformation {
 
 impl GroupInformation {
     /// Without a recording.
-    #[must_use]
     pub fn none() -> Self {
         Self { information: SymmetricMatrix::zeros(PARAMETERS), weighted: [0.0; PARAMETERS] }
     }
 
     /// Information of recordings that scatter by `recording_sd`.
-    #[must_use]
     pub fn new(recordings: &[&RecordingEstimate], recording_sd: &Values) -> Self {
         let mut out = Self::none();
         recordings.iter().for_each(|r| out.add(&r.information, &r.weighted(), recording_sd));
@@ -239,7 +237,6 @@ impl GroupInformation {
     }
 
     /// The same multiplied by `share`.
-    #[must_use]
     pub fn times(&self, share: f64) -> Self {
         let root = [share.sqrt(); PARAMETERS];
         Self { information: rescaled(&self.information, &root), weighted: self.weighted.map(|w| share * w) }
@@ -287,13 +284,11 @@ impl Subset {
 
 impl GroupEstimate {
     /// Estimate from recordings of the group, which may be none.
-    #[must_use]
     pub fn new(recordings: &[&RecordingEstimate], group_sd: Values, recording_sd: Values) -> Self {
         Self::from_information(&GroupInformation::new(recordings, &recording_sd), group_sd)
     }
 
     /// Estimate from the information of the recordings.
-    #[must_use]
     pub fn from_information(known: &GroupInformation, group_sd: Values) -> Self {
         let free: Vec<usize> = (0..PARAMETERS).filter(|k| group_sd[*k] > 0.0).collect();
         let subsets: Vec<(Values, Subset)> = (0..1_usize << free.len())
@@ -330,20 +325,17 @@ impl GroupEstimate {
     }
 
     /// Whether a parameter may deviate.
-    #[must_use]
     pub fn is_free(&self, parameter: usize) -> bool {
         self.prior_sd[parameter] > 0.0
     }
 
     /// Standard deviations if all parameters may deviate.
-    #[must_use]
     pub fn sd(&self) -> Values {
         let variance = self.precision.inverse_diagonal();
         std::array::from_fn(|k| self.prior_sd[k] * variance[k].max(0.0).sqrt())
     }
 
     /// Difference from the mean for independent standard normal values.
-    #[must_use]
     pub fn draw(&self, independent: &Values) -> Values {
         let off = self.precision.back_substitute(independent);
         std::array::from_fn(|k| self.prior_sd[k] * off[k])

@@ -47,7 +47,6 @@ pub struct InsertionCourse {
 
 impl InsertionCourse {
     /// The course of a recording.
-    #[must_use]
     pub fn new(recording: &Recording) -> Self {
         let (t, z) = (&recording.time_s, &recording.position_m);
         let phases = detect_phases(recording);
@@ -63,7 +62,6 @@ impl InsertionCourse {
     }
 
     /// Place of every block, with the tissue shifted by `shift_m` along the axis.
-    #[must_use]
     pub fn places(&self, blocks: &BlockAverages, range: DepthRange, shift_m: f64) -> Vec<f64> {
         let length_m = (range.deepest_m - range.start_m).max(1e-9);
         let within = |share: f64, segment: usize| {
@@ -89,7 +87,6 @@ impl InsertionCourse {
 }
 
 /// Means of `values` per bin; bins without a value are interpolated within their phase.
-#[must_use]
 pub fn curve_of(places: &[f64], used: &[bool], values: &[f64]) -> Curve {
     let mut sums = vec![(0.0, 0.0); BINS];
     for ((place, _), value) in places.iter().zip(used).zip(values).filter(|((_, used), _)| **used) {
@@ -112,7 +109,6 @@ pub fn curve_of(places: &[f64], used: &[bool], values: &[f64]) -> Curve {
 }
 
 /// Value of a curve at a place, interpolated linearly.
-#[must_use]
 pub fn value_at(curve: &[Option<f64>], place: f64) -> Option<f64> {
     let low = place.floor() as usize;
     let share = place - low as f64;
@@ -122,7 +118,6 @@ pub fn value_at(curve: &[Option<f64>], place: f64) -> Option<f64> {
 }
 
 /// Mean of curves, where all of them have a value.
-#[must_use]
 pub fn mean_curve(curves: &[&Curve]) -> Curve {
     let n = curves.len().max(1) as f64;
     let mean = |k: usize| {
@@ -133,7 +128,6 @@ pub fn mean_curve(curves: &[&Curve]) -> Curve {
 }
 
 /// Means over neighbouring bins of the same phase.
-#[must_use]
 pub fn pooled(curve: &[Option<f64>]) -> Curve {
     let mut out = vec![None; BINS];
     for segment in SEGMENTS.windows(2) {

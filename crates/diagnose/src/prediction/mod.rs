@@ -156,8 +156,7 @@ pub fn predict(
     }
     let all: Vec<NamedRecording> = evidence.iter().chain(&options.refit_on).cloned().collect();
     let prepared = Prepared::new(scenario, diagnosis, &all);
-    let training = diagnosis.and_then(|d| d.training.as_ref());
-    let targets: Vec<Target> = (0..all.len()).map(|r| Target::new(&prepared, training, r)).collect();
+    let targets: Vec<Target> = (0..all.len()).map(|r| Target::new(&prepared, r)).collect();
     let is_known = targets.iter().all(|t| t.training_index.is_some());
     let varying =
         options.varying.clone().unwrap_or_else(|| if is_known { Vec::new() } else { Factor::ALL.to_vec() });
@@ -166,17 +165,16 @@ pub fn predict(
     let refit = if options.refit.is_empty() {
         None
     } else {
-        let fit = GroupFit::new(&prepared, training, &targets, &options.refit, &varying, &fitted);
-        let refit = fit.and_then(|fit| refit::GroupRefit::new(fit, prepared.misfit_n(training)));
+        let fit = GroupFit::new(&prepared, &targets, &options.refit, &varying, &fitted);
+        let refit = fit.and_then(|fit| refit::GroupRefit::new(fit, prepared.misfit_n()));
         Some(refit.ok_or(DiagnoseError::NoFit)?)
     };
     let before = assumed.map(|b| Model::base(std::sync::Arc::new(assumptions_of(b)), all.len()));
-    let each: Vec<_> = (0..n)
+    let each: Option<Vec<_>> = (0..n)
         .into_par_iter()
         .map(|r| {
             predicted_recording::predict_one(
                 &prepared,
-                training,
                 &targets[r],
                 before.as_ref(),
                 refit.as_ref().map(|refit| refit.group_for(r)),
@@ -184,14 +182,9 @@ pub fn predict(
             )
         })
         .collect();
-    let (mut recordings, mut curves) = (Vec::with_capacity(n), Vec::with_capacity(n));
-    let mut sums = Vec::with_capacity(n);
-    for found in each {
-        let (predicted, shown, sum) = found.ok_or(DiagnoseError::NoFit)?;
-        recordings.push(predicted);
-        curves.push(shown);
-        sums.push(sum);
-    }
+    let each = each.ok_or(DiagnoseError::NoFit)?;
+    let sums: Vec<ErrorSums> = each.iter().map(|(_, _, sums)| *sums).collect();
+    let (recordings, curves) = each.into_iter().map(|(predicted, shown, _)| (predicted, shown)).unzip();
     let total = sums.iter().fold(ErrorSums::default(), |all, one| all.plus(one));
     let blocks = total.blocks.max(1.0);
     let prediction = Prediction {
@@ -204,7 +197,7 @@ pub fn predict(
             same: total.inside_same / blocks,
             unseen: total.inside_unseen / blocks,
         }),
-        band_includes: prepared.uncertainty.components(training, &varying),
+        band_includes: prepared.uncertainty.components(prepared.training, &varying),
         varying,
         held_out: refit.is_none() || all.len() > n || n > 1,
         refit: refit.map(|r| r.report),

@@ -1,13 +1,11 @@
 //! Prediction of one recording.
 
-use super::group_deviation::{Factor, deviating_model, group_sd};
+use super::group_deviation::{Factor, deviating_model};
 use super::group_update::GroupEstimate;
 use super::insertion_course::{Curve, value_at};
-use super::prediction_band::Band;
 use super::prepared::Prepared;
 use super::refit::RefittedGroup;
-use super::target::{Target, with_unseen_speed};
-use super::training_curves::TrainingSummary;
+use super::target::Target;
 use crate::held_out::predict_free_run;
 use serde::{Deserialize, Serialize};
 use stylet_identify::model::{Model, NO_RUPTURE};
@@ -26,7 +24,8 @@ pub struct RecordingPrediction {
     /// Largest measured minus largest predicted force, in N.
     pub peak_error_n: f64,
     /// Whether it is a training recording.
-    pub made_the_law: bool,
+    #[serde(rename = "made_the_law")]
+    pub is_training_recording: bool,
     /// Offset of the sensor's zero in N, which was subtracted; `None` if it is negligible.
     #[serde(default)]
     pub zero_offset_n: Option<f64>,
@@ -99,7 +98,6 @@ impl ErrorSums {
 /// Predicts one recording; `group` is its refitted group, if any.
 pub fn predict_one(
     prepared: &Prepared,
-    training: Option<&TrainingSummary>,
     target: &Target,
     before: Option<&Model>,
     group: Option<RefittedGroup>,
@@ -116,30 +114,23 @@ pub fn predict_one(
     };
     let less = |e: &[f64]| -> Vec<f64> { b.force_n.iter().zip(e).map(|(f, e)| f - e).collect() };
     let mut predicted_n = less(&law.residual_n);
-    prepared.add_mean_residual(training, r, &deviation, &target.mean_residual, &mut predicted_n);
+    prepared.add_mean_residual(r, &deviation, &target.mean_residual, &mut predicted_n);
     let within_n2 = b.within_block_sd_n().powi(2);
-    let blocks = b.used.iter().filter(|u| **u).count() as f64;
+    let blocks = b.compared_block_count() as f64;
     let square = |f: &dyn Fn(usize) -> f64| {
         let errors = (0..b.len()).filter(|k| b.used[*k]).map(|k| (b.force_n[k] - f(k)).powi(2));
         errors.sum::<f64>() + within_n2 * blocks
-    };
-    let band = Band {
-        prepared,
-        training,
-        recording: r,
-        mean_residual: &target.mean_residual,
-        places: &target.places,
     };
     let inside = |(low, high): &(Vec<f64>, Vec<f64>)| {
         (0..b.len()).filter(|k| b.used[*k] && (low[*k]..=high[*k]).contains(&b.force_n[*k])).count() as f64
     };
     let of_group = |varying: &[Factor]| {
-        let sd = with_unseen_speed(group_sd(varying), prepared, training, r);
-        band.edges(&GroupEstimate::new(&[], sd, [0.0; 4]), [0.0; 4], !varying.is_empty(), 0.0)
+        let group = GroupEstimate::new(&[], prepared.group_sd(varying, r), [0.0; 4]);
+        prepared.band(target, &group, [0.0; 4], !varying.is_empty(), 0.0)
     };
     let mut sums = ErrorSums { blocks, after: square(&|k| predicted_n[k]), ..ErrorSums::default() };
     let (edges, other_band_n) = if let Some(g) = &group {
-        (band.edges(&g.estimate, deviation, !varying.is_empty(), g.extra_misfit_n), None)
+        (prepared.band(target, &g.estimate, deviation, !varying.is_empty(), g.extra_misfit_n), None)
     } else {
         let assumed = of_group(varying);
         let other = of_group(if varying.is_empty() { &Factor::ALL } else { &[] });
@@ -169,7 +160,7 @@ pub fn predict_one(
         assumed_rmse_n: was.as_ref().map(|_| (sums.before / count).sqrt()),
         band_coverage: sums.inside / count,
         peak_error_n: peak(&b.force_n) - peak(&predicted_n),
-        made_the_law: target.training_index.is_some(),
+        is_training_recording: target.training_index.is_some(),
         zero_offset_n: prepared.zero_offset_n[r],
         surface_shift_m: is_fitted(0).then_some(deviation[0]),
         force_factor: factor(1),

@@ -4,7 +4,7 @@ use super::group_deviation::Values;
 use super::group_update::GroupEstimate;
 use super::insertion_course::{Curve, value_at};
 use super::prepared::Prepared;
-use super::training_curves::TrainingSummary;
+use super::target::Target;
 use super::uncertainty::{DRAWS, SEED};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
@@ -15,49 +15,36 @@ use stylet_stats::order_statistics::quantile_of_sorted;
 pub const BAND_LEVEL: f64 = 0.9;
 /// Number of equally likely noise values per draw, which smooth its quantiles.
 const NOISE_VALUES: usize = 9;
-/// Prediction band of one recording.
-pub struct Band<'a> {
-    /// Model and recordings.
-    pub prepared: &'a Prepared,
-    /// Summary of the training recordings.
-    pub training: Option<&'a TrainingSummary>,
-    /// The recording.
-    pub recording: usize,
-    /// Mean residual (N) of the training recordings.
-    pub mean_residual: &'a Curve,
-    /// Place of every block in the course.
-    pub places: &'a [f64],
-}
-
-impl Band<'_> {
-    /// Lower and upper edge (N) per block for a group with deviation `deviation`. In an unseen group (`is_unseen`), the mean residual may
-    /// not recur and counts as discrepancy; so does `extra_misfit_n`.
-    pub fn edges(
+impl Prepared<'_> {
+    /// Prediction band of a recording: lower and upper edge (N) per block for a group with deviation `deviation`. In an unseen group
+    /// (`is_unseen`), the mean residual may not recur and counts as discrepancy; so does `extra_misfit_n`.
+    pub fn band(
         &self,
+        target: &Target,
         group: &GroupEstimate,
         deviation: Values,
         is_unseen: bool,
         extra_misfit_n: f64,
     ) -> (Vec<f64>, Vec<f64>) {
-        let (prepared, r) = (self.prepared, self.recording);
+        let r = target.r;
         let mut rng = ChaCha8Rng::seed_from_u64(SEED);
         let draws: Vec<Vec<f64>> = (0..DRAWS)
             .filter_map(|_| {
-                let model = prepared.uncertainty.draw(&prepared.model, r, &mut rng);
+                let model = self.uncertainty.draw(&self.model, r, &mut rng);
                 let off = group.draw(&std::array::from_fn(|_| StandardNormal.sample(&mut rng)));
                 let at: Values = std::array::from_fn(|k| deviation[k] + off[k]);
-                prepared.force_of(&model, self.training, r, &at, self.mean_residual)
+                self.force_of(&model, r, &at, &target.mean_residual)
             })
             .collect();
-        band_edges(&draws, |k| libm::hypot(self.misfit_sd_n(k, is_unseen), extra_misfit_n))
+        band_edges(&draws, |k| libm::hypot(self.misfit_sd_n(target, k, is_unseen), extra_misfit_n))
     }
 
     /// Standard deviation (N) of noise and discrepancy in block `k`.
-    fn misfit_sd_n(&self, k: usize, is_unseen: bool) -> f64 {
-        let noise_n = self.prepared.uncertainty.block_n;
-        let Some((t, place)) = self.training.zip(self.places.get(k)) else { return noise_n };
+    fn misfit_sd_n(&self, target: &Target, k: usize, is_unseen: bool) -> f64 {
+        let noise_n = self.uncertainty.block_n;
+        let Some((t, place)) = self.training.zip(target.places.get(k)) else { return noise_n };
         let of = |curve: &Curve| value_at(curve, *place).unwrap_or(0.0);
-        let missing_n = if is_unseen { of(self.mean_residual) } else { 0.0 };
+        let missing_n = if is_unseen { of(&target.mean_residual) } else { 0.0 };
         libm::hypot(libm::hypot(noise_n, of(&t.discrepancy_sd_n)), missing_n)
     }
 }

@@ -1,15 +1,15 @@
 //! Recordings and a model, prepared for predictions.
 
-use super::group_deviation::{Values, deviating_model};
+use super::group_deviation::{Factor, RATE_EXPONENT_SD, Values, deviating_model, group_sd};
 use super::insertion_course::{Curve, InsertionCourse, value_at};
 use super::training_curves::TrainingSummary;
 use super::uncertainty::{Uncertainty, free_run_force};
 use super::zero_offset::zero_offset_n;
 use crate::base_law_fit::assumptions_of;
 use crate::diagnosis_json::Diagnosis;
-use crate::input_checks::{NamedRecording, clean_recordings};
+use crate::input_checks::{NamedRecording, average_blocks, clean_recordings};
 use std::sync::Arc;
-use stylet_identify::block_averages::{BLOCK_S, BlockAverages};
+use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::likelihood::FitData;
 use stylet_identify::model::Model;
 use stylet_identify::noise::Noise;
@@ -17,7 +17,8 @@ use stylet_scenario::Scenario;
 use stylet_stats::parallel::*;
 
 /// Recordings and a model.
-pub struct Prepared {
+#[derive(Clone)]
+pub struct Prepared<'a> {
     /// Names of the recordings.
     pub names: Vec<String>,
     /// The recordings in blocks.
@@ -28,20 +29,17 @@ pub struct Prepared {
     pub model: Model,
     /// Noise, scatter and intervals of the diagnosis.
     pub uncertainty: Uncertainty,
+    /// Summary of the training recordings, if they are known.
+    pub training: Option<&'a TrainingSummary>,
     /// Offset of the sensor's zero in N, per recording; it has been subtracted from `data`.
     pub zero_offset_n: Vec<Option<f64>>,
 }
 
-impl Prepared {
+impl<'a> Prepared<'a> {
     /// Cleans and averages the recordings, and sets up the model of the scenario.
-    pub fn new(scenario: &Scenario, diagnosis: Option<&Diagnosis>, evidence: &[NamedRecording]) -> Self {
+    pub fn new(scenario: &Scenario, diagnosis: Option<&'a Diagnosis>, evidence: &[NamedRecording]) -> Self {
         let ready = clean_recordings(evidence);
-        let blocks: Vec<BlockAverages> = ready
-            .recordings
-            .par_iter()
-            .zip(&ready.raw.exclude)
-            .map(|(r, x)| BlockAverages::new(r, x, BLOCK_S))
-            .collect();
+        let blocks = average_blocks(&ready.recordings, &ready.raw);
         let uncertainty = Uncertainty::new(diagnosis, &blocks);
         let model = Model::base(Arc::new(assumptions_of(scenario)), blocks.len());
         let data = FitData::new(Arc::new(blocks), Noise::white(uncertainty.block_n), 0.0);
@@ -63,6 +61,7 @@ impl Prepared {
             data: data.with_recordings(data.recordings.iter().zip(&zero_offset_n).map(zeroed).collect()),
             model,
             uncertainty,
+            training: diagnosis.and_then(|d| d.training.as_ref()),
             zero_offset_n,
         }
     }
@@ -72,65 +71,61 @@ impl Prepared {
         free_run_force(&self.model, &self.data, r)
     }
 
-    /// Length of a block in s.
-    pub fn block_s(&self, b: &BlockAverages) -> f64 {
-        (b.samples_per_block as f64 * b.sample_step_s).max(1e-9)
-    }
-
     /// Weight of a squared error of a block of recording `r`, in 1/N²; a block counts for less than one sample because the discrepancy is
     /// correlated.
-    pub fn weight(&self, training: Option<&TrainingSummary>, r: usize) -> f64 {
-        let block_s = self.block_s(&self.data.recordings[r]);
-        let correlation_s = training.map_or(0.0, |t| t.correlation_s);
-        block_s / (block_s + 2.0 * correlation_s) / self.misfit_n(training).powi(2)
+    pub fn weight(&self, r: usize) -> f64 {
+        let block_s = self.data.recordings[r].block_s();
+        let correlation_s = self.training.map_or(0.0, |t| t.correlation_s);
+        block_s / (block_s + 2.0 * correlation_s) / self.misfit_n().powi(2)
     }
 
     /// RMS error (N) of the model on the training recordings; the noise if these are unknown.
-    pub fn misfit_n(&self, training: Option<&TrainingSummary>) -> f64 {
-        training.map_or(self.uncertainty.block_n, |t| t.residual_rms_n).max(1e-12)
+    pub fn misfit_n(&self) -> f64 {
+        self.training.map_or(self.uncertainty.block_n, |t| t.residual_rms_n).max(1e-12)
     }
 
     /// Force (N) per block of recording `r` for a deviation, with the mean residual.
-    pub fn force(
-        &self,
-        training: Option<&TrainingSummary>,
-        r: usize,
-        deviation: &Values,
-        mean_residual: &Curve,
-    ) -> Option<Vec<f64>> {
-        self.force_of(&self.model, training, r, deviation, mean_residual)
+    pub fn force(&self, r: usize, deviation: &Values, mean_residual: &Curve) -> Option<Vec<f64>> {
+        self.force_of(&self.model, r, deviation, mean_residual)
     }
 
     /// The same for another model.
     pub fn force_of(
         &self,
         model: &Model,
-        training: Option<&TrainingSummary>,
         r: usize,
         deviation: &Values,
         mean_residual: &Curve,
     ) -> Option<Vec<f64>> {
         let mut force = free_run_force(&deviating_model(model, r, deviation), &self.data, r)?;
-        self.add_mean_residual(training, r, deviation, mean_residual, &mut force);
+        self.add_mean_residual(r, deviation, mean_residual, &mut force);
         Some(force)
     }
 
     /// Adds the mean residual, shifted with the surface, and applies the factor of all forces.
     pub fn add_mean_residual(
         &self,
-        training: Option<&TrainingSummary>,
         r: usize,
         deviation: &Values,
         mean_residual: &Curve,
         force_n: &mut [f64],
     ) {
         let factor = libm::exp(deviation[1]);
-        if let Some(t) = training {
+        if let Some(t) = self.training {
             let places = self.courses[r].places(&self.data.recordings[r], t.range, deviation[0]);
             for (f, place) in force_n.iter_mut().zip(&places) {
                 *f += value_at(mean_residual, *place).unwrap_or(0.0);
             }
         }
         force_n.iter_mut().for_each(|f| *f *= factor);
+    }
+
+    /// Standard deviations between groups that differ in the factors `varying`, for recording `r`: wider at a speed without training
+    /// recordings.
+    pub fn group_sd(&self, varying: &[Factor], r: usize) -> Values {
+        let mut sd = group_sd(varying);
+        let ln_ratio = self.training.map_or(0.0, |t| t.ln_speed_ratio(self.courses[r].speed_mps));
+        sd[1] = libm::hypot(sd[1], RATE_EXPONENT_SD * ln_ratio);
+        sd
     }
 }

@@ -1,11 +1,11 @@
 //! A recording to predict, matched with the training recordings.
 
-use super::group_deviation::{RATE_EXPONENT_SD, Values};
 use super::insertion_course::{Curve, curve_of};
 use super::prepared::Prepared;
-use super::training_curves::{BaselineCurves, TrainingSummary};
+use super::training_curves::BaselineCurves;
 
 /// A recording to predict.
+#[derive(Default)]
 pub struct Target {
     /// Its index.
     pub r: usize,
@@ -21,17 +21,9 @@ pub struct Target {
 
 impl Target {
     /// Matches recording `r` with the training recordings.
-    pub fn new(prepared: &Prepared, training: Option<&TrainingSummary>, r: usize) -> Self {
+    pub fn new(prepared: &Prepared, r: usize) -> Self {
         let (b, course) = (&prepared.data.recordings[r], &prepared.courses[r]);
-        let Some(t) = training else {
-            return Self {
-                r,
-                training_index: None,
-                mean_residual: Curve::new(),
-                places: Vec::new(),
-                baselines: BaselineCurves::default(),
-            };
-        };
+        let Some(t) = prepared.training else { return Self { r, ..Self::default() } };
         let places = course.places(b, t.range, 0.0);
         let training_index = t.index_of(&curve_of(&places, &b.used, &b.force_n));
         let (speed, stroke) = (course.speed_mps, course.range.deepest_m);
@@ -43,16 +35,4 @@ impl Target {
             places,
         }
     }
-}
-
-/// Standard deviations between groups, widened for a speed without training recordings.
-pub fn with_unseen_speed(
-    mut sd: Values,
-    prepared: &Prepared,
-    training: Option<&TrainingSummary>,
-    r: usize,
-) -> Values {
-    let ln_ratio = training.map_or(0.0, |t| t.ln_speed_ratio(prepared.courses[r].speed_mps));
-    sd[1] = libm::hypot(sd[1], RATE_EXPONENT_SD * ln_ratio);
-    sd
 }

@@ -111,15 +111,15 @@ pub(super) fn summarise(prepared: &Prepared) -> Option<TrainingSummary> {
     out.discrepancy_sd_n = stored(discrepancy.iter().map(|d| d.map(|d| scale * d)).collect());
     let (mut square, mut lagged, mut blocks) = (0.0, 0.0, 0.0);
     for (e, b) in left.iter().zip(data.recordings.iter()) {
-        let lag = (CORRELATION_LAG_S / prepared.block_s(b)).round().max(1.0) as usize;
+        let lag = (CORRELATION_LAG_S / b.block_s()).round().max(1.0) as usize;
         square += lagged_sum(e, &b.used, 0);
         lagged += lagged_sum(e, &b.used, lag);
-        blocks += b.used.iter().filter(|u| **u).count() as f64;
+        blocks += b.compared_block_count() as f64;
     }
     out.residual_rms_n = (square / f64::max(blocks, 1.0)).sqrt().max(uncertainty.block_n);
     let correlation = (lagged / square.max(1e-300)).clamp(CORRELATION_BOUNDS.0, CORRELATION_BOUNDS.1);
     out.correlation_s = -CORRELATION_LAG_S / libm::log(correlation);
-    out.recording_sd = recording_sd(prepared, &out, &mean_residuals)?;
+    out.recording_sd = recording_sd(&Prepared { training: Some(&out), ..prepared.clone() }, &mean_residuals)?;
     Some(out)
 }
 
@@ -134,15 +134,14 @@ fn mean_of_known(curves: &[Curve]) -> Curve {
 }
 
 /// Standard deviations of the training recordings about the model, with the documented ones as prior.
-fn recording_sd(prepared: &Prepared, so_far: &TrainingSummary, mean_residuals: &[Curve]) -> Option<Values> {
+fn recording_sd(prepared: &Prepared, mean_residuals: &[Curve]) -> Option<Values> {
     let wide = super::group_deviation::group_sd(&super::group_deviation::Factor::ALL);
     let each: Vec<Values> = (0..prepared.names.len())
         .into_par_iter()
         .map(|r| {
             let b = &prepared.data.recordings[r];
-            let observed =
-                Observation { force_n: &b.force_n, used: &b.used, weight: prepared.weight(Some(so_far), r) };
-            let force = |u: &Values| prepared.force(Some(so_far), r, u, &mean_residuals[r]);
+            let observed = Observation { force_n: &b.force_n, used: &b.used, weight: prepared.weight(r) };
+            let force = |u: &Values| prepared.force(r, u, &mean_residuals[r]);
             Some(estimate_recording(&observed, force, wide)?.deviation)
         })
         .collect::<Option<_>>()?;

@@ -37,7 +37,8 @@ pub enum TransferVerdict {
     /// The groups differ, but the recordings do not show in which parameter.
     Ambiguous,
     /// The new group follows another law.
-    AnotherLaw,
+    #[serde(rename = "another_law")]
+    AnotherModel,
 }
 
 /// Difference of the new group in one parameter.
@@ -67,7 +68,8 @@ pub struct RecordingTransfer {
     /// RMS error (N) of the updated model.
     pub after_n: f64,
     /// Whether the model was fitted to it.
-    pub made_the_law: bool,
+    #[serde(rename = "made_the_law")]
+    pub is_training_recording: bool,
     /// Offset of the sensor's zero in N, which was subtracted; `None` if it is negligible.
     #[serde(default)]
     pub zero_offset_n: Option<f64>,
@@ -124,11 +126,10 @@ pub fn compare_groups(
     let training = diagnosis.training.as_ref().ok_or(DiagnoseError::NoTrainingSummary)?;
     let prepared = Prepared::new(scenario, Some(diagnosis), recordings);
     let n = recordings.len();
-    let targets: Vec<Target> = (0..n).map(|r| Target::new(&prepared, Some(training), r)).collect();
+    let targets: Vec<Target> = (0..n).map(|r| Target::new(&prepared, r)).collect();
     let all: Vec<usize> = (0..n).collect();
     let varying = Factor::ALL;
-    let fit = GroupFit::new(&prepared, Some(training), &targets, &Refit::ALL, &varying, &all)
-        .ok_or(DiagnoseError::NoFit)?;
+    let fit = GroupFit::new(&prepared, &targets, &Refit::ALL, &varying, &all).ok_or(DiagnoseError::NoFit)?;
     let information = fit.information(None);
     let group = GroupEstimate::from_information(&information, fit.group_sd);
     let model_recordings = training.runs.len();
@@ -152,7 +153,7 @@ pub fn compare_groups(
             }
         })
         .collect();
-    let model_n = prepared.misfit_n(Some(training));
+    let model_n = prepared.misfit_n();
     let rms_n = |of: &[usize], deviation: Values| fit.rms_n(of, |_| deviation).ok_or(DiagnoseError::NoFit);
     let (before_n, after_n) = (rms_n(&all, [0.0; PARAMETERS])?, rms_n(&all, group.full_mean)?);
     let extra_misfit_n = (after_n.powi(2) - model_n.powi(2)).max(0.0).sqrt();
@@ -163,7 +164,7 @@ pub fn compare_groups(
                 estimate: group.clone(),
                 extra_misfit_n,
             });
-            predict_one(&prepared, Some(training), target, None, group, &varying)
+            predict_one(&prepared, target, None, group, &varying)
         };
         let each: Option<Vec<_>> = targets.par_iter().map(|t| Some(one(t)?.1)).collect();
         each.ok_or(DiagnoseError::NoFit)
@@ -176,7 +177,7 @@ pub fn compare_groups(
                 name: prepared.names[*r].clone(),
                 before_n: rms_n(&[*r], [0.0; PARAMETERS])?,
                 after_n: rms_n(&[*r], group.full_mean)?,
-                made_the_law: targets[*r].training_index.is_some(),
+                is_training_recording: targets[*r].training_index.is_some(),
                 zero_offset_n: prepared.zero_offset_n[*r],
             })
         })
@@ -184,7 +185,7 @@ pub fn compare_groups(
     let own_n = fit.own_rms_n().ok_or(DiagnoseError::NoFit)?;
     let misfit_ratio = own_n / model_n;
     let verdict = if misfit_ratio > MAX_MISFIT_RATIO {
-        TransferVerdict::AnotherLaw
+        TransferVerdict::AnotherModel
     } else if (0..PARAMETERS).any(differs) {
         TransferVerdict::Differs
     } else if difference.probability_of_none < DIFFERENCE_PROBABILITY {

@@ -97,7 +97,7 @@ pub fn plan_transfer(
 
 /// One motion for each speed and stroke of the recordings that made the model.
 struct PlannedMotions<'a> {
-    prepared: Prepared,
+    prepared: Prepared<'a>,
     training: &'a TrainingSummary,
     speeds_mps: Vec<f64>,
     mean_residuals: Vec<Curve>,
@@ -109,7 +109,7 @@ struct PlannedMotions<'a> {
 impl<'a> PlannedMotions<'a> {
     fn new(
         scenario: &Scenario,
-        diagnosis: &Diagnosis,
+        diagnosis: &'a Diagnosis,
         training: &'a TrainingSummary,
         varying: &[Factor],
     ) -> Option<Self> {
@@ -141,7 +141,7 @@ impl<'a> PlannedMotions<'a> {
         for m in 0..distinct.len() {
             let blocks = out.force(m, &[0.0; PARAMETERS])?.len();
             let slopes = slopes(&|u: &Values| out.force(m, u), &[0.0; PARAMETERS], &sd, blocks);
-            let weight = out.prepared.weight(Some(training), m);
+            let weight = out.prepared.weight(m);
             let mut information = SymmetricMatrix::zeros(PARAMETERS);
             for i in 0..PARAMETERS {
                 for j in 0..=i {
@@ -154,7 +154,7 @@ impl<'a> PlannedMotions<'a> {
     }
 
     fn force(&self, m: usize, deviation: &Values) -> Option<Vec<f64>> {
-        self.prepared.force(Some(self.training), m, deviation, &self.mean_residuals[m])
+        self.prepared.force(m, deviation, &self.mean_residuals[m])
     }
 
     fn forces(&self, deviation: &Values) -> Option<Vec<Vec<f64>>> {

@@ -170,8 +170,8 @@ fn deviate(effect: &mut AnyEffect, path: &str, deviation: f64) {
 
 /// Free-run force (N) of a model for recording `r`.
 pub fn free_run_force(model: &Model, data: &FitData, r: usize) -> Option<Vec<f64>> {
-    let trail = stylet_identify::likelihood::ReplayCache::new(model, data, r)?;
+    let cache = stylet_identify::likelihood::ReplayCache::new(model, data, r)?;
     let mut at = model.clone();
-    at.rupture_times_s[r] = trail.free_rupture_times();
+    at.rupture_times_s[r] = cache.free_rupture_times();
     Some(replay(&at, data, r)?.force_n)
 }

@@ -4,8 +4,7 @@ use super::cross_validation::PredictionScore;
 use super::held_out_loss::{MIN_EFFECT_LOSS, exceeds_standard_error, is_significant, relative_losses};
 use super::multistart_fit::SetFit;
 use super::scored_model::{
-    ModelFamily, ScoredModel, cross_validate, cross_validate_speeds, rms_errors_n, shaft_slip_info,
-    with_coarse_blocks,
+    ModelFamily, ScoredModel, cross_validate, cross_validate_speeds, rms_errors_n, with_coarse_blocks,
 };
 use super::segmented_recording::SegmentedRecording;
 use std::sync::Arc;
@@ -13,7 +12,7 @@ use stylet_identify::likelihood::residuals;
 use stylet_identify::model::{Assumptions, EffectTerm, MAX_VARYING_PARAMETERS, Model, TiedParameter};
 use stylet_identify::rupture_likelihood::RuptureEvent;
 use stylet_stats::parallel::*;
-use stylet_tissue::AnyEffect;
+use stylet_tissue::{AnyEffect, ShaftSlip};
 
 /// Relative held-out loss from which a parameter group within an effect is kept. It is smaller than [`MIN_EFFECT_LOSS`] because the group
 /// is never reported as a cause; one standard error suffices (Breiman et al. 1984: the simplest of about equal models).
@@ -42,8 +41,7 @@ pub struct ModelTerm {
 
 impl ModelTerm {
     /// Whether this is an effect that improves prediction without significance: it is kept in the model but not reported as a cause.
-    #[must_use]
-    pub fn is_uncertain(&self) -> bool {
+    pub(crate) fn is_uncertain(&self) -> bool {
         self.kept && !self.significant && self.name == self.effect
     }
 }
@@ -51,10 +49,10 @@ impl ModelTerm {
 /// Candidate terms for removal, each with its name and the model without it; `events` are those of the fit.
 fn removal_candidates(model: &Model, events: &[Vec<RuptureEvent>]) -> Vec<(&'static str, String, Model)> {
     let mut out = Vec::new();
-    let has_slip = model.effects.iter().any(|c| c.info.id == shaft_slip_info().id);
+    let has_slip = model.effects.iter().any(|c| c.info.id == ShaftSlip::ID);
     let mut tested: Vec<&str> = Vec::new();
     for id in model.effects.iter().map(|c| c.info.id) {
-        if tested.contains(&id) || id == shaft_slip_info().id {
+        if tested.contains(&id) || id == ShaftSlip::ID {
             continue;
         }
         tested.push(id);
@@ -77,7 +75,7 @@ fn removal_candidates(model: &Model, events: &[Vec<RuptureEvent>]) -> Vec<(&'sta
         ];
         for (name, numbers) in inactive {
             if let Some(model) = with_fixed_slip_parameters(model, numbers) {
-                out.push((shaft_slip_info().id, format!("{}: {name}", shaft_slip_info().id), model));
+                out.push((ShaftSlip::ID, format!("{}: {name}", ShaftSlip::ID), model));
             }
         }
     }
@@ -133,7 +131,7 @@ fn with_fixed_slip_parameters(model: &Model, numbers: &[(&str, f64)]) -> Option<
     let mut any = false;
     for effect in 0..out.effects.len() {
         let term = &out.effects[effect];
-        if term.info.id != shaft_slip_info().id {
+        if term.info.id != ShaftSlip::ID {
             continue;
         }
         let mut values = term.values.clone();

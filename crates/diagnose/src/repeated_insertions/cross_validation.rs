@@ -6,7 +6,6 @@ use super::multistart_fit::{SetFit, fit_with_noise_updates};
 use super::population_prediction::{DRAWS, PredictedForce, predict_force};
 use super::random_effects_population::Population;
 use super::segmented_recording::{SegmentedRecording, group_by_speed_and_stroke};
-use stylet_identify::model::NO_RUPTURE;
 use stylet_stats::interpolate;
 use stylet_stats::parallel::*;
 
@@ -27,11 +26,10 @@ pub struct PredictionScore {
 }
 
 /// Scores a predicted force.
-#[must_use]
-pub fn score_prediction(run: &SegmentedRecording, p: &PredictedForce) -> PredictionScore {
+pub(crate) fn score_prediction(run: &SegmentedRecording, p: &PredictedForce) -> PredictionScore {
     let r = &run.recording;
     let mut out = PredictionScore::default();
-    let first = run.ruptures_s.iter().copied().fold(NO_RUPTURE, f64::min);
+    let first = run.first_rupture_s();
     let (mut sum, mut inside) = (0.0, 0.0);
     let limit_n = run.limit_n.map_or(f64::INFINITY, f64::abs);
     let clamped = |f: f64| f.clamp(-limit_n, limit_n);
@@ -59,8 +57,7 @@ pub fn score_prediction(run: &SegmentedRecording, p: &PredictedForce) -> Predict
 }
 
 /// Recordings that are not held out.
-#[must_use]
-pub fn training_recordings<'a>(
+pub(crate) fn training_recordings<'a>(
     recordings: &[&'a SegmentedRecording],
     out: &[usize],
 ) -> Vec<&'a SegmentedRecording> {
@@ -68,8 +65,7 @@ pub fn training_recordings<'a>(
 }
 
 /// Refits without the recordings `out`; `rounds` are the numbers of iterations between noise updates.
-#[must_use]
-pub fn refit_without(all: &SetFit, out: &[usize], rounds: &[usize]) -> Option<SetFit> {
+pub(crate) fn refit_without(all: &SetFit, out: &[usize], rounds: &[usize]) -> Option<SetFit> {
     let kept: Vec<usize> = (0..all.drop_times_s.len()).filter(|r| !out.contains(r)).collect();
     let drops: Vec<Vec<f64>> = kept.iter().map(|r| all.drop_times_s[*r].clone()).collect();
     let (fit, data) =
@@ -78,8 +74,7 @@ pub fn refit_without(all: &SetFit, out: &[usize], rounds: &[usize]) -> Option<Se
 }
 
 /// Population of a refit without the recordings `out`.
-#[must_use]
-pub fn population_without(
+pub(crate) fn population_without(
     all: &SetFit,
     recordings: &[&SegmentedRecording],
     out: &[usize],

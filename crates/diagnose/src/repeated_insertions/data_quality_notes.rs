@@ -2,20 +2,11 @@
 
 use super::segmented_recording::{SegmentedRecording, mean_speeds};
 use crate::diagnosis_json::DataQualityNote;
-use std::collections::BTreeMap;
 use stylet_record::{DEFAULT_HALF_WIDTH_S, QualityKind, QualityNote, Recording};
 
 /// Data-quality notes: one per speed for what its recordings share, then those of each recording.
-#[must_use]
 pub fn data_quality(recordings: &[&SegmentedRecording]) -> Vec<DataQualityNote> {
     let mut out = Vec::new();
-    let plain = |message: String, numbers: BTreeMap<String, f64>| QualityNote {
-        kind: QualityKind::Jitter,
-        message,
-        numbers,
-        lines: Vec::new(),
-        blocking: false,
-    };
     let mean = |values: &mut dyn Iterator<Item = f64>| stylet_stats::mean(&values.collect::<Vec<_>>());
     for (v, members) in mean_speeds(recordings) {
         let some: Vec<&SegmentedRecording> = members.iter().map(|i| recordings[*i]).collect();
@@ -35,22 +26,20 @@ pub fn data_quality(recordings: &[&SegmentedRecording]) -> Vec<DataQualityNote> 
             1e3 * end
         );
         let numbers = [("speed_mps", v), ("sample_hz", rate), ("largest_gap_s", largest), ("stroke_m", end)];
-        let numbers = numbers.into_iter().map(|(k, v)| (k.to_owned(), v)).collect();
         out.push(DataQualityNote {
             recording: format!("all at {:.2} mm/s", 1e3 * v),
-            note: plain(message, numbers),
+            note: QualityNote::new(QualityKind::Jitter, message, numbers),
         });
     }
     for run in recordings {
         let quality = |note: QualityNote| DataQualityNote { recording: run.name.clone(), note };
         out.extend(run.notes.iter().cloned().map(quality));
-        out.push(quality(plain(sampling_summary(&run.recording), BTreeMap::new())));
+        out.push(quality(QualityNote::new(QualityKind::Jitter, sampling_summary(&run.recording), [])));
     }
     out
 }
 
 /// Sampling and stroke of a recording in words, for the data-quality section.
-#[must_use]
 pub fn sampling_summary(recording: &Recording) -> String {
     let n = recording.len();
     let mean_hz = (n - 1) as f64 / recording.duration_s();

@@ -4,8 +4,7 @@ use super::ablation::ModelTerm;
 use super::cross_validation::{HeldOutPrediction, leave_one_out, leave_speed_out, repeatability_floor};
 use super::data_quality_notes::data_quality;
 use super::held_out_loss::paired_confidence;
-use super::instrument_faults::CalibratedRecordings;
-use super::instrument_faults::{InstrumentReport, ReferenceRecordings};
+use super::instrument_faults::{CalibratedRecordings, InstrumentReport, ReferenceRecordings};
 use super::mean_scenario::mean_scenario;
 use super::model_selection::{CandidateModels, select_model};
 use super::nested_cross_validation::nested_cross_validation;
@@ -13,11 +12,12 @@ use super::parameter_estimates::{ParameterEstimate, base_parameters, jackknife_e
 use super::repeatability_report::{
     AblationRow, MeanReport, RepeatabilityReport, ReportInputs, repeatability_report,
 };
-use super::scored_model::{ModelFamily, ScoredModel, active_effects, shaft_slip_info};
+use super::scored_model::{ModelFamily, ScoredModel, active_effects};
 use super::segmented_recording::{SegmentedRecording, have_several_speeds};
 use crate::claims::{self, Context, SIGNIFICANT_P_VALUE};
+use crate::diagnose::random_effect_sd;
 use crate::diagnosis_json::{
-    Cause, Diagnosis, Estimate, Gain, NegligibleEffect, NoiseReport, RandomEffectSd, ResidualStructureReport,
+    Cause, Diagnosis, Estimate, Gain, NegligibleEffect, NoiseReport, ResidualStructureReport,
     SearchCandidate, SearchStep, Verdict,
 };
 use crate::model_grade::grade;
@@ -28,7 +28,7 @@ use std::collections::BTreeMap;
 use stylet_identify::insertion_phases::noise_n;
 use stylet_record::sensor_artefacts;
 use stylet_scenario::Scenario;
-use stylet_tissue::{DelayedPuncture, Effect, PowerLawFriction, RateDependentPuncture, Tissue};
+use stylet_tissue::{DelayedPuncture, Effect, PowerLawFriction, RateDependentPuncture, ShaftSlip, Tissue};
 
 /// Seed of the random start values, constant so that equal recordings give equal results.
 const START_VALUE_SEED: u64 = 1;
@@ -67,6 +67,12 @@ impl SetDiagnosis {
         }
         claims::apply(d, &Context::default());
         d.grade = Some(grade(d, 0.0));
+    }
+
+    /// Runs the nested cross-validation and adds it to the report.
+    pub fn run_nested_cross_validation(&mut self) {
+        let recordings: Vec<&SegmentedRecording> = self.recordings.iter().collect();
+        self.report.nested = nested_cross_validation(&self.candidates, &recordings);
     }
 }
 
@@ -127,51 +133,35 @@ pub fn diagnose_set(
     })
 }
 
-impl SetDiagnosis {
-    /// Runs the nested cross-validation and adds it to the report.
-    pub fn run_nested_cross_validation(&mut self) {
-        let recordings: Vec<&SegmentedRecording> = self.recordings.iter().collect();
-        self.report.nested = nested_cross_validation(&self.candidates, &recordings);
-    }
-}
-
-/// Leave-one-out predictions of the base law; `best` are those of the best model.
+/// Leave-one-out predictions of the base law; `held_out` are those of the best model.
 fn base_predictions(
     candidates: &CandidateModels,
     held_out: &[HeldOutPrediction],
     recordings: &[&SegmentedRecording],
 ) -> Vec<HeldOutPrediction> {
-    if candidates.best.family == ModelFamily::Base {
-        held_out.to_vec()
-    } else {
-        leave_one_out(&candidates.base.set_fit, recordings)
+    match candidates.best.family {
+        ModelFamily::Base => held_out.to_vec(),
+        _ => leave_one_out(&candidates.base.set_fit, recordings),
     }
 }
 
 /// Held-out errors of the candidate models and of the ablated terms.
 fn ablation_rows(candidates: &CandidateModels) -> Vec<AblationRow> {
-    let mut rows = Vec::new();
-    let row = |step: String, candidate: &ScoredModel| AblationRow {
-        step,
+    let model = |step: &str, candidate: &ScoredModel| AblationRow {
+        step: step.to_owned(),
         held_out_n: candidate.held_out_n(),
         without_n: None,
         kept: candidate.family == candidates.best.family,
     };
-    if let Some(candidate) = &candidates.library {
-        rows.push(row("base law with library effects".to_owned(), candidate));
-    }
-    if let Some(candidate) = &candidates.slip {
-        rows.push(row("stick-slip of the shaft".to_owned(), candidate));
-    }
-    for term in &candidates.terms {
-        rows.push(AblationRow {
-            step: term.name.clone(),
-            held_out_n: candidates.best.held_out_n(),
-            without_n: Some(stylet_stats::mean(&term.without_n)).filter(|e| e.is_finite()),
-            kept: term.kept,
-        });
-    }
-    rows
+    let term = |term: &ModelTerm| AblationRow {
+        step: term.name.clone(),
+        held_out_n: candidates.best.held_out_n(),
+        without_n: Some(stylet_stats::mean(&term.without_n)).filter(|e| e.is_finite()),
+        kept: term.kept,
+    };
+    let library = candidates.library.as_ref().map(|c| model("base law with library effects", c));
+    let slip = candidates.slip.as_ref().map(|c| model("stick-slip of the shaft", c));
+    library.into_iter().chain(slip).chain(candidates.terms.iter().map(term)).collect()
 }
 
 fn diagnosis(
@@ -195,21 +185,13 @@ fn diagnosis(
         .into_iter()
         .filter(|id| !unsure(id))
         .map(|id| {
-            let whole =
-                if id == shaft_slip_info().id { Some(candidates.base.errors_n.clone()) } else { None };
-            let without = whole
-                .or_else(|| {
-                    candidates.terms.iter().find(|p| p.kept && p.name == id).map(|p| p.without_n.clone())
-                })
-                .unwrap_or_default();
-            cause(
-                id,
-                &estimates,
-                paired_confidence(&without, &best.errors_n),
-                &without,
-                best,
-                &candidates.base,
-            )
+            let term = candidates.terms.iter().find(|p| p.kept && p.name == id);
+            let without = match id {
+                ShaftSlip::ID => &candidates.base.errors_n[..],
+                _ => term.map_or(&[][..], |p| &p.without_n),
+            };
+            let confidence = paired_confidence(without, &best.errors_n);
+            cause(id, &estimates, confidence, without, best, &candidates.base)
         })
         .collect();
     causes.sort_by(|a, b| b.share.total_cmp(&a.share));
@@ -231,21 +213,10 @@ fn diagnosis(
         (false, true) => Verdict::None,
         (false, false) => Verdict::Named,
     };
-    let scatter = &model.scatter;
     let mut diagnosis = Diagnosis {
         verdict,
-        agrees: false,
-        grade: None,
-        findings: Vec::new(),
-        check: Vec::new(),
-        by_recording: Vec::new(),
-        visible_effects: Vec::new(),
-        partial: None,
-        formulas: None,
         causes,
         base_parameters: base_parameters(&estimates, assumed),
-        parameters: Vec::new(),
-        covariance: Vec::new(),
         not_identifiable: unidentified_effects(best, recordings),
         gain: Gain {
             held_out: true,
@@ -270,14 +241,9 @@ fn diagnosis(
             ar: [repeats.instrument.ar1.unwrap_or(0.0), 0.0],
             from_air: repeats.instrument.noise_n.is_some(),
         },
-        random_effect_sd: RandomEffectSd {
-            puncture: scatter.rupture_force,
-            rupture_depth_m: scatter.rupture_depth_m,
-            surface_m: scatter.surface_m,
-            friction: scatter.ln_friction,
-        },
+        random_effect_sd: random_effect_sd(model),
         advice: advice(best, &estimates),
-        training: None,
+        ..Diagnosis::default()
     };
     // The repeatability floor already contains the scatter between recordings.
     claims::apply(&mut diagnosis, &Context::default());
@@ -317,11 +283,7 @@ fn add_fault(causes: &mut Vec<Cause>, fault: Cause, is_corrected: bool) {
 
 /// Effects that recordings at a single speed do not identify.
 fn unidentified_effects(best: &ScoredModel, recordings: &[&SegmentedRecording]) -> Vec<String> {
-    let all = [
-        PowerLawFriction { exponent: 1.0 }.info().id,
-        RateDependentPuncture { alpha: 0.0 }.info().id,
-        DelayedPuncture::default().info().id,
-    ];
+    let all = [PowerLawFriction::ID, RateDependentPuncture::ID, DelayedPuncture::ID];
     let named = active_effects(&best.set_fit.fit.model);
     let unidentified = all.iter().filter(|id| !have_several_speeds(recordings) && !named.contains(id));
     unidentified.map(|id| (*id).to_owned()).collect()
@@ -344,7 +306,6 @@ fn cause(
     let share = (square(without) - square(&best.errors_n)) / explained;
     Cause {
         effect: id.to_owned(),
-        equivalent: Vec::new(),
         confidence,
         parameters,
         gain_nats: (base.set_fit.fit.nats() - best.set_fit.fit.nats()).max(0.0),
@@ -382,7 +343,7 @@ fn search_step(candidates: &CandidateModels) -> SearchStep {
         screened_only: false,
     };
     let mut all = Vec::new();
-    all.extend(candidates.slip.as_ref().map(|l| tried(shaft_slip_info().id, l)));
+    all.extend(candidates.slip.as_ref().map(|l| tried(ShaftSlip::ID, l)));
     all.extend(
         candidates.library.as_ref().map(|l| tried(&active_effects(&l.set_fit.fit.model).join(", "), l)),
     );

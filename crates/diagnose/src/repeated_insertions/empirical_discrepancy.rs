@@ -26,7 +26,6 @@ pub struct EmpiricalDiscrepancy {
 
 impl EmpiricalDiscrepancy {
     /// The corrected prediction.
-    #[must_use]
     pub fn apply(&self, predicted: &PredictedForce) -> PredictedForce {
         let mut out = predicted.clone();
         for (i, (more, wider)) in self.mean_n.iter().zip(&self.band_scale).enumerate() {
@@ -49,7 +48,6 @@ fn time_knots(run: &SegmentedRecording) -> [f64; 5] {
 
 /// Discrepancy of `run` from the residuals of the `others` of its group, each with its mean predicted force (N); `predicted` is the
 /// prediction of `run`.
-#[must_use]
 pub fn estimate_discrepancy(
     run: &SegmentedRecording,
     predicted: &PredictedForce,

@@ -7,9 +7,8 @@ use super::population_prediction::{DRAWS, predict_force, simulate_force};
 use super::random_effects_population::Population;
 use super::repeatability_report::CompositionReport;
 use super::scored_model::ModelFamily;
-use super::segmented_recording::SegmentedRecording;
-use super::segmented_recording::mean_speeds;
-use super::start_values::{SLIP_RATE_INDEX, base_law_prior};
+use super::segmented_recording::{SegmentedRecording, mean_speeds};
+use super::start_values::{base_law_prior, is_rate_held};
 use super::stick_slip_fit::fit_stick_slip;
 use rand::{SeedableRng, rngs::ChaCha8Rng};
 use std::sync::Arc;
@@ -113,9 +112,6 @@ fn fit_single_layer(
 /// shaft parameter at its bound is not identified either: it is taken from the first layer, `like`, because the shaft is the same. The push
 /// plateau then has the same ratio to the pull plateau, and the force held right after a rupture is unchanged.
 fn identified_effects(model: &Model, speed_mps: f64, like: Option<&ShaftSlip>) -> Vec<EffectTerm> {
-    let held = |e: usize| {
-        model.tied.iter().any(|b| (b.effect, b.parameter, b.tied_to) == (e, SLIP_RATE_INDEX, None))
-    };
     let one = |(e, term): (usize, &EffectTerm)| match term.effect() {
         Some(AnyEffect::ShaftSlip(mut s)) => {
             let unknown = |path: &str| {
@@ -138,11 +134,11 @@ fn identified_effects(model: &Model, speed_mps: f64, like: Option<&ShaftSlip>) -
                     s.wear_per_m = like.wear_per_m;
                 }
             }
-            if held(e) {
+            if is_rate_held(model, e) {
                 let (push_n, pull_n) = (s.plateau_n(speed_mps), -s.plateau_n(-speed_mps));
                 s = ShaftSlip { rate: -1.0 / s.exponent, push_n, pull_n, ..s };
             }
-            EffectTerm::new(term.info, &AnyEffect::from(s).parameters())
+            EffectTerm::of(&s.into())
         }
         _ => term.clone(),
     };
@@ -190,7 +186,7 @@ fn surface_shift_m(combined: &Model, run: &SegmentedRecording) -> f64 {
     let mut combined = combined.clone();
     (combined.per_recording, combined.rupture_times_s) =
         (vec![RecordingParameters::default()], vec![vec![NO_RUPTURE; combined.layers()]]);
-    let (r, first_s) = (&run.recording, run.ruptures_s.iter().copied().fold(NO_RUPTURE, f64::min));
+    let (r, first_s) = (&run.recording, run.first_rupture_s());
     let mut further_m = 0.0;
     for _ in 0..8 {
         let here = simulate_force(&with_moved_surface(&combined, further_m), run);

@@ -11,7 +11,6 @@ const MIN_HOLD_S: f64 = 0.1;
 const DEFAULT_NOISE_N: f64 = 0.01;
 
 /// Scenario of the model at the mean of its random effects, with the motion of the middle recording.
-#[must_use]
 pub fn mean_scenario(
     name: &str,
     model: &Model,

@@ -8,39 +8,39 @@
 //! | [`dataset`] | description of a data set and its files |
 //! | [`segmented_recording`], [`insertion_phase`] | recordings with phases and events, grouped by speed and stroke |
 //! | [`instrument_faults`] | detection and correction of sensor and drive faults |
-//! | [`start_values`], [`multistart_fit`], [`stick_slip_fit`] | priors, start values and fits |
+//! | `start_values`, [`multistart_fit`], [`stick_slip_fit`] | priors, start values and fits |
 //! | [`random_effects_population`], [`population_prediction`] | random effects, and predicted force with its band |
-//! | [`empirical_discrepancy`] | correction of a prediction by the residuals of other recordings |
-//! | [`cross_validation`], [`nested_cross_validation`] | held-out errors and the repeatability floor |
-//! | [`scored_model`], [`held_out_loss`], [`ablation`], [`model_selection`] | comparison of models and of their terms |
-//! | [`parameter_estimates`] | estimates with jackknife intervals |
+//! | `empirical_discrepancy` | correction of a prediction by the residuals of other recordings |
+//! | [`cross_validation`], `nested_cross_validation` | held-out errors and the repeatability floor |
+//! | [`scored_model`], `held_out_loss`, `ablation`, [`model_selection`] | comparison of models and of their terms |
+//! | `parameter_estimates` | estimates with jackknife intervals |
 //! | [`diagnose_set`](mod@diagnose_set) | the complete diagnosis |
-//! | [`repeatability_report`](mod@repeatability_report), [`data_quality_notes`], [`mean_scenario`](mod@mean_scenario) | its results |
+//! | [`repeatability_report`](mod@repeatability_report), `data_quality_notes`, `mean_scenario`(mod@mean_scenario) | its results |
 //! | [`layer_composition`] | stack of layers measured alone |
 //! | [`indentation_relaxation`] | specimens indented once and held |
 
-pub mod ablation;
+mod ablation;
 pub mod cross_validation;
-pub mod data_quality_notes;
+mod data_quality_notes;
 pub mod dataset;
 pub mod diagnose_set;
-pub mod empirical_discrepancy;
-pub mod held_out_loss;
+mod empirical_discrepancy;
+mod held_out_loss;
 pub mod indentation_relaxation;
 pub mod insertion_phase;
 pub mod instrument_faults;
 pub mod layer_composition;
-pub mod mean_scenario;
+mod mean_scenario;
 pub mod model_selection;
 pub mod multistart_fit;
-pub mod nested_cross_validation;
-pub mod parameter_estimates;
+mod nested_cross_validation;
+mod parameter_estimates;
 pub mod population_prediction;
 pub mod random_effects_population;
 pub mod repeatability_report;
 pub mod scored_model;
 pub mod segmented_recording;
-pub mod start_values;
+mod start_values;
 pub mod stick_slip_fit;
 
 pub use segmented_recording::SegmentedRecording;

@@ -43,8 +43,7 @@ pub struct CandidateModels {
 
 /// Fits and compares the candidate models: from the numbers of a scenario, if there is one, as a diagnosis of single recordings does, and from
 /// those in the data. `None` when the base law cannot be fitted.
-#[must_use]
-pub fn select_model(
+pub(crate) fn select_model(
     (assumed, scenario): (&Tissue, Option<&Scenario>),
     recordings: &[&SegmentedRecording],
     artefacts: &SensorArtefacts,
@@ -55,7 +54,7 @@ pub fn select_model(
     let prepared = PreparedRecordings::new(
         Arc::new(scenario.map_or_else(|| base_law_prior(assumed, recordings), assumptions_of)),
         set_blocks(recordings, artefacts),
-        quantisation_noise_n(artefacts),
+        artefacts.quantisation_sd_n(),
     );
     let (searched, which) = search_subset(&prepared, recordings);
     let clean: Vec<Recording> = which.iter().map(|r| recordings[*r].recording.clone()).collect();
@@ -92,11 +91,6 @@ pub fn select_model(
     progress("testing the terms of the model");
     let parts = ablate(&mut best, recordings);
     Some(CandidateModels { base, library, slip, best, terms: parts })
-}
-
-/// Quantisation noise (N).
-fn quantisation_noise_n(artefacts: &SensorArtefacts) -> f64 {
-    artefacts.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD
 }
 
 /// Candidate with the smallest held-out error; the base law unless another improves on it by [`MIN_IMPROVEMENT`].

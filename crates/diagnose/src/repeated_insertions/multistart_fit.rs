@@ -3,7 +3,7 @@
 
 use super::segmented_recording::{SPEED_TOLERANCE, SegmentedRecording};
 use super::start_values::{
-    EXPECTED_DAY_FRICTION_SD, EXPECTED_DAY_SURFACE_SD_M, SLIP_RATE_INDEX, StartValues, shaft_slip_start,
+    EXPECTED_DAY_FRICTION_SD, EXPECTED_DAY_SURFACE_SD_M, StartValues, is_rate_held, shaft_slip_start,
 };
 use crate::base_law_fit::COARSENING_FACTOR;
 use rand::{RngExt, rngs::ChaCha8Rng};
@@ -26,9 +26,9 @@ const INITIAL_NOISE_SHARE: f64 = 0.1;
 /// Weight of the prior scatter between days, in days.
 pub(super) const PRIOR_DAYS: f64 = 4.0;
 /// Iterations of the screening fits, per noise update.
-const SCREENING_TURNS: [usize; 2] = [6, 6];
+const SCREENING_ITERATIONS: [usize; 2] = [6, 6];
 /// Iterations of the fits that continue, per noise update.
-const CONTINUED_TURNS: [usize; 2] = [6, 8];
+const CONTINUED_ITERATIONS: [usize; 2] = [6, 8];
 /// Number of starts that continue after screening.
 const CONTINUED_STARTS: usize = 8;
 /// Largest number of distinct optima that are refined.
@@ -61,8 +61,7 @@ impl SetFit {
     }
 
     /// Fits another model to the same recordings, from its own values.
-    #[must_use]
-    pub fn refit_with(&self, model: &Model) -> Option<Self> {
+    pub(crate) fn refit_with(&self, model: &Model) -> Option<Self> {
         let (fit, data) = fit_with_noise_updates(model, self.data.clone(), &self.drop_times_s, &[6])?;
         Some(Self { fit, data, drop_times_s: self.drop_times_s.clone(), starts: self.starts })
     }
@@ -120,33 +119,29 @@ fn start_values(k: usize, rng: &mut ChaCha8Rng) -> StartValues {
     }
 }
 
-/// Fits in rounds; before each, noise, rupture times and scatter are updated from the previous fit.
-#[must_use]
-pub fn fit_with_noise_updates(
+/// Fits in rounds; before each but the first, noise, rupture times and scatter are updated from the previous fit. The data returned have the
+/// noise of the last one.
+pub(crate) fn fit_with_noise_updates(
     model: &Model,
-    data: FitData,
+    mut data: FitData,
     drops: &[Vec<f64>],
     rounds: &[usize],
 ) -> Option<(Fit, FitData)> {
-    let mut data = data;
     let mut best: Option<Fit> = None;
-    for turns in rounds {
+    for iterations in rounds {
         let mut from = best.as_ref().map_or(model, |b| &b.model).clone();
         move_day_trend_to_rate(&mut from, &data);
         if let Some(best) = &best {
-            data = data.with_noise(discrepancy_noise(
-                &data.recordings,
-                &best.residuals.residual_n,
-                data.floor_n,
-            ));
             update_event_times(&mut from, &data, drops);
             update_scatter(&mut from, &data, best);
         }
-        best = Some(fit_nonsmooth(&from, &data, Effort { max_iterations: *turns, min_gain_nats: 0.05 })?);
+        let effort = Effort { max_iterations: *iterations, min_gain_nats: 0.05 };
+        let fitted = fit_nonsmooth(&from, &data, effort)?;
+        data =
+            data.with_noise(discrepancy_noise(&data.recordings, &fitted.residuals.residual_n, data.floor_n));
+        best = Some(fitted);
     }
-    let best = best?;
-    data = data.with_noise(discrepancy_noise(&data.recordings, &best.residuals.residual_n, data.floor_n));
-    Some((best, data))
+    Some((best?, data))
 }
 
 /// Logarithm of the advance speed (mm/s).
@@ -159,9 +154,6 @@ fn ln_speed(blocks: &BlockAverages) -> f64 {
 /// Moves the part of the day effects on friction that is linear in the logarithm of speed to the rate exponent. The force is the same, but
 /// the day effects are smaller, and a fit makes little progress along this valley of the objective.
 fn move_day_trend_to_rate(model: &mut Model, data: &FitData) {
-    let held = |e: usize| {
-        model.tied.iter().any(|b| (b.effect, b.parameter, b.tied_to) == (e, SLIP_RATE_INDEX, None))
-    };
     let is_slip = |e: &usize| matches!(model.effects[*e].effect(), Some(AnyEffect::ShaftSlip(_)));
     let which: Vec<usize> = (0..model.effects.len()).filter(is_slip).collect();
     let speed =
@@ -175,7 +167,7 @@ fn move_day_trend_to_rate(model: &mut Model, data: &FitData) {
         (square + (s - x).powi(2), product + (s - x) * model.days[*d].ln_friction)
     });
     if which.is_empty()
-        || which.iter().any(|e| held(*e))
+        || which.iter().any(|e| is_rate_held(model, *e))
         || square < libm::log1p(SPEED_TOLERANCE).powi(2) / 2.0
     {
         return;
@@ -188,7 +180,7 @@ fn move_day_trend_to_rate(model: &mut Model, data: &FitData) {
         if let Some(AnyEffect::ShaftSlip(mut s)) = term.effect() {
             s.scale_friction(libm::exp(level));
             s.rate += slope;
-            model.effects[e] = EffectTerm::new(term.info, &AnyEffect::from(s).parameters());
+            model.effects[e] = EffectTerm::of(&s.into());
         }
     }
 }
@@ -196,10 +188,10 @@ fn move_day_trend_to_rate(model: &mut Model, data: &FitData) {
 /// Updates the scatter between recordings and between days: mean square of the estimates plus their conditional variance (expectation
 /// maximisation with the curvature of the fit). A parameter without information keeps its scatter.
 fn update_scatter(model: &mut Model, data: &FitData, at: &Fit) {
-    let tangent = Linearization::new(&at.model, data, &at.residuals);
-    let (count, random_effects) = (data.recording_count(), tangent.per_recording.len());
+    let linearization = Linearization::new(&at.model, data, &at.residuals);
+    let (count, random_effects) = (data.recording_count(), linearization.per_recording.len());
     let conditional = |places: &[usize]| -> Vec<f64> {
-        let factor = tangent.normal_matrix.submatrix(places).cholesky();
+        let factor = linearization.normal_matrix.submatrix(places).cholesky();
         (0..places.len())
             .map(|i| {
                 let unit: Vec<f64> = (0..places.len()).map(|j| f64::from(u8::from(i == j))).collect();
@@ -211,16 +203,19 @@ fn update_scatter(model: &mut Model, data: &FitData, at: &Fit) {
     for r in 0..count {
         // Random effects without information are skipped.
         let moves: Vec<usize> = (0..random_effects)
-            .filter(|o| tangent.normal_matrix.at(tangent.index_of(*o, r), tangent.index_of(*o, r)) > 0.0)
+            .filter(|o| {
+                linearization.normal_matrix.at(linearization.index_of(*o, r), linearization.index_of(*o, r))
+                    > 0.0
+            })
             .collect();
-        let places: Vec<usize> = moves.iter().map(|o| tangent.index_of(*o, r)).collect();
+        let places: Vec<usize> = moves.iter().map(|o| linearization.index_of(*o, r)).collect();
         for (o, variance) in moves.iter().zip(conditional(&places)) {
-            let x = at.model.get(tangent.per_recording[*o].role, r);
+            let x = at.model.get(linearization.per_recording[*o].role, r);
             sums[*o].0 += x * x + variance;
             sums[*o].1 += 1.0;
         }
     }
-    for (n, (sum, count)) in tangent.per_recording.iter().zip(&sums) {
+    for (n, (sum, count)) in linearization.per_recording.iter().zip(&sums) {
         let sd = (sum / f64::max(*count, 1.0)).sqrt();
         match n.role {
             ParameterRole::RecordingSurface => model.scatter.surface_m = sd,
@@ -230,7 +225,7 @@ fn update_scatter(model: &mut Model, data: &FitData, at: &Fit) {
         }
     }
     let mut days = [(0.0, 0.0); 2];
-    for (i, n) in tangent.shared.iter().enumerate() {
+    for (i, n) in linearization.shared.iter().enumerate() {
         let kind = match n.role {
             ParameterRole::DaySurface(_) => 0,
             ParameterRole::DayFriction(_) => 1,
@@ -296,10 +291,10 @@ pub fn multistart_fit(
         recordings.iter().map(|r| r.ruptures_s.iter().copied().filter(|t| t.is_finite()).collect()).collect();
     let coarse = with_initial_noise(fine.iter().map(|b| b.coarsened(COARSENING_FACTOR)).collect());
     // Most starts are dropped after screening.
-    let mut found = fit_all(starts, &coarse, &drops, &SCREENING_TURNS);
+    let mut found = fit_all(starts, &coarse, &drops, &SCREENING_ITERATIONS);
     found.truncate(CONTINUED_STARTS);
     let promising: Vec<Model> = found.into_iter().map(|f| f.1).collect();
-    let found = fit_all(&promising, &coarse, &drops, &CONTINUED_TURNS);
+    let found = fit_all(&promising, &coarse, &drops, &CONTINUED_ITERATIONS);
     let errors: Vec<f64> = found.iter().map(|f| f.0).collect();
     let (agree, apart) = distinct_optima(&errors);
     let whole = with_initial_noise(fine);

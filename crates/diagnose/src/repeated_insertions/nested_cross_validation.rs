@@ -8,7 +8,7 @@ use super::cross_validation::{refit_without, training_recordings};
 use super::model_selection::{CandidateModels, best_candidate};
 use super::random_effects_population::Population;
 use super::scored_model::{
-    REFIT_TURNS, ScoredModel, active_effects, folds, predict_fold, with_coarse_blocks,
+    REFIT_ITERATIONS, ScoredModel, active_effects, folds, predict_fold, with_coarse_blocks,
 };
 use super::segmented_recording::SegmentedRecording;
 use serde::Serialize;
@@ -26,7 +26,6 @@ pub struct NestedCrossValidation {
 
 /// Repeats the selection without each fold, with the start values of the fits to all recordings. `None` when a fold leaves too few
 /// recordings.
-#[must_use]
 pub fn nested_cross_validation(
     candidates: &CandidateModels,
     recordings: &[&SegmentedRecording],
@@ -37,7 +36,7 @@ pub fn nested_cross_validation(
         let of = |candidate: &ScoredModel| {
             Some(ScoredModel::new(
                 candidate.family,
-                refit_without(&with_coarse_blocks(&candidate.set_fit), &fold, &[REFIT_TURNS])?,
+                refit_without(&with_coarse_blocks(&candidate.set_fit), &fold, &[REFIT_ITERATIONS])?,
                 &some,
             ))
         };

@@ -30,7 +30,6 @@ pub struct ParameterEstimate {
 
 impl ParameterEstimate {
     /// Value and interval.
-    #[must_use]
     pub fn estimate(&self) -> Estimate {
         Estimate { value: self.value, low: self.low, high: self.high }
     }
@@ -38,10 +37,8 @@ impl ParameterEstimate {
 
 /// Whether a parameter is at its bound.
 pub(super) fn is_at_bound(model: &Model, role: ParameterRole) -> bool {
-    model.shared_parameters().iter().find(|n| n.role == role).is_some_and(|n| {
-        let (x, near) = (model.get(role, 0), BOUND_TOLERANCE * (n.high - n.low).min(1.0));
-        x <= n.low + near || x >= n.high - near
-    })
+    let parameter = model.shared_parameters().into_iter().find(|n| n.role == role);
+    parameter.is_some_and(|n| n.is_at_bound(model.get(role, 0), BOUND_TOLERANCE))
 }
 
 /// Owner and path of every parameter, its value, and whether it is at its bound.
@@ -53,24 +50,11 @@ fn parameter_values(model: &Model) -> Vec<(String, String, f64, bool)> {
     push("layer.0".to_owned(), "surface_m", model.tissue.surface_m, reached(ParameterRole::Surface));
     for (l, layer) in model.tissue.layers.iter().enumerate() {
         let owner = format!("layer.{}", l + 1);
-        push(
-            owner.clone(),
-            "front_m",
-            model.tissue.front_m(l),
-            l > 0 && reached(ParameterRole::Thickness(l - 1)),
-        );
-        push(
-            owner.clone(),
-            "stiffness_n_per_m",
-            layer.stiffness_n_per_m,
-            reached(ParameterRole::Stiffness(l)),
-        );
-        push(
-            owner.clone(),
-            "friction_ns_per_m2",
-            layer.friction_ns_per_m2,
-            reached(ParameterRole::Friction(l)),
-        );
+        let is_front_at_bound = l > 0 && reached(ParameterRole::Thickness(l - 1));
+        push(owner.clone(), "front_m", model.tissue.front_m(l), is_front_at_bound);
+        let (stiffness, friction) = (layer.stiffness_n_per_m, layer.friction_ns_per_m2);
+        push(owner.clone(), "stiffness_n_per_m", stiffness, reached(ParameterRole::Stiffness(l)));
+        push(owner.clone(), "friction_ns_per_m2", friction, reached(ParameterRole::Friction(l)));
         if let Some(force) = layer.puncture_n {
             push(owner, "puncture_n", force, reached(ParameterRole::Puncture(l)));
         }
@@ -93,7 +77,6 @@ fn parameter_values(model: &Model) -> Vec<(String, String, f64, bool)> {
 }
 
 /// Estimates with 95 % jackknife intervals over recordings (Quenouille, Tukey). They include model error that differs between recordings.
-#[must_use]
 pub fn jackknife_estimates(fitted: &SetFit, out: &[HeldOutPrediction]) -> Vec<ParameterEstimate> {
     let others: Vec<_> =
         out.iter().filter_map(|o| o.population.as_ref()).map(|p| parameter_values(&p.model)).collect();
@@ -113,7 +96,6 @@ pub fn jackknife_estimates(fitted: &SetFit, out: &[HeldOutPrediction]) -> Vec<Pa
 }
 
 /// Base parameters among the estimates, with their assumed values.
-#[must_use]
 pub fn base_parameters(estimates: &[ParameterEstimate], assumed_tissue: &Tissue) -> Vec<BaseParameter> {
     estimates
         .iter()

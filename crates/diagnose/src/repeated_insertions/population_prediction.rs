@@ -84,8 +84,7 @@ impl PredictedForce {
 }
 
 /// Predicts the force of a recording from its motion, on a known day or, for `None`, on a random one.
-#[must_use]
-pub fn predict_force(
+pub(crate) fn predict_force(
     population: &Population,
     run: &SegmentedRecording,
     day: Option<usize>,

@@ -60,8 +60,7 @@ impl Population {
                 if is_in_air(b.force_n[k] - e[k]) {
                     air.push(e[k]);
                 } else {
-                    left[phase_at(recordings[r], 0.5 * (b.start_s[k] + b.end_s[k]), first) as usize]
-                        .push(e[k]);
+                    left[phase_at(recordings[r], b.mid_s(k), first) as usize].push(e[k]);
                 }
             }
         }
@@ -84,13 +83,12 @@ impl Population {
     }
 
     /// Adds the uncertainty of the shared parameters, for predictions of a held-out speed.
-    #[must_use]
-    pub fn with_parameter_uncertainty(self, fitted: &SetFit) -> Self {
+    pub(crate) fn with_parameter_uncertainty(self, fitted: &SetFit) -> Self {
         let model = &fitted.fit.model;
         let open = residuals(model, &fitted.data).map(|at| {
-            let tangent = Linearization::new(model, &fitted.data, &at);
-            let factor = tangent.factor();
-            (tangent.shared, factor)
+            let linearization = Linearization::new(model, &fitted.data, &at);
+            let factor = linearization.factor();
+            (linearization.shared, factor)
         });
         Self { parameter_information: open, ..self }
     }
@@ -166,8 +164,7 @@ impl Population {
 }
 
 /// Equally likely values of a normal distribution with standard deviation `sd_n` (N).
-#[must_use]
-pub fn normal_quantiles(sd_n: f64) -> [f64; QUANTILES] {
+pub(crate) fn normal_quantiles(sd_n: f64) -> [f64; QUANTILES] {
     std::array::from_fn(|k| sd_n * quantile((k as f64 + 0.5) / QUANTILES as f64))
 }
 

@@ -9,14 +9,14 @@ use crate::base_law_fit::COARSENING_FACTOR;
 use stylet_identify::block_averages::BlockAverages;
 use stylet_identify::model::Model;
 use stylet_stats::parallel::*;
-use stylet_tissue::{Effect, EffectInfo, ShaftSlip};
+use stylet_tissue::Effect;
 
 /// Number of cross-validation folds for more than [`LEAVE_ONE_OUT_LIMIT`] recordings.
 const FOLDS: usize = 3;
 /// Largest number of recordings that are held out one by one.
 const LEAVE_ONE_OUT_LIMIT: usize = 8;
 /// Iterations of a refit in cross-validation.
-pub(super) const REFIT_TURNS: usize = 5;
+pub(super) const REFIT_ITERATIONS: usize = 5;
 /// Draws of a prediction in cross-validation.
 const DRAWS: usize = 16;
 
@@ -61,13 +61,11 @@ impl ScoredModel {
 
 /// The fit on coarser blocks; unchanged if its blocks are already coarse.
 pub(super) fn with_coarse_blocks(fitted: &SetFit) -> SetFit {
-    let long = |b: &BlockAverages| b.samples_per_block as f64 * b.sample_step_s > 1.5 * SET_BLOCK_S;
+    let long = |b: &BlockAverages| b.block_s() > 1.5 * SET_BLOCK_S;
     if fitted.data.recordings.iter().all(long) {
         return fitted.clone();
     }
-    let blocks: Vec<BlockAverages> =
-        fitted.data.recordings.par_iter().map(|b| b.coarsened(COARSENING_FACTOR)).collect();
-    SetFit { data: fitted.data.with_recordings(blocks), ..fitted.clone() }
+    SetFit { data: fitted.data.coarsened(COARSENING_FACTOR), ..fitted.clone() }
 }
 
 /// Indices of the recordings of each cross-validation fold.
@@ -123,7 +121,9 @@ fn held_out_scores(
     let done: Vec<Vec<(usize, PredictionScore)>> = parts
         .par_iter()
         .map(|part| {
-            let Some(p) = population_without(at, recordings, part, &[REFIT_TURNS]) else { return Vec::new() };
+            let Some(p) = population_without(at, recordings, part, &[REFIT_ITERATIONS]) else {
+                return Vec::new();
+            };
             predict_fold(&p, day_of, recordings, part)
         })
         .collect();
@@ -137,12 +137,6 @@ fn held_out_scores(
 /// Held-out RMS error (N) per recording; infinite without a prediction.
 pub(super) fn rms_errors_n(scores: &[Option<PredictionScore>]) -> Vec<f64> {
     scores.iter().map(|s| s.as_ref().map_or(f64::INFINITY, |s| s.rmse_n)).collect()
-}
-
-/// The `shaft_slip` effect.
-#[must_use]
-pub fn shaft_slip_info() -> &'static EffectInfo {
-    ShaftSlip::default().info()
 }
 
 /// Active effects of a model, without repetition.

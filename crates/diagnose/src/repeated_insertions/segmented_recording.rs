@@ -69,13 +69,16 @@ impl SegmentedRecording {
             recording,
         }
     }
-}
 
-impl SegmentedRecording {
     /// Abrupt force drops before the retraction.
     #[must_use]
     pub fn drops(&self) -> Vec<AbruptDrop> {
         abrupt_drops(&self.recording, &self.phases)
+    }
+
+    /// Time (s) of the first rupture; [`NO_RUPTURE`] without one.
+    pub(crate) fn first_rupture_s(&self) -> f64 {
+        self.ruptures_s.iter().copied().fold(NO_RUPTURE, f64::min)
     }
 
     /// Standard deviation of the sensor noise in N.
@@ -107,15 +110,13 @@ pub fn group_by_speed_and_stroke(recordings: &[&SegmentedRecording]) -> Vec<Vec<
 }
 
 /// Whether all recordings have the same speed.
-#[must_use]
-pub fn have_one_speed(recordings: &[&SegmentedRecording]) -> bool {
+pub(crate) fn have_one_speed(recordings: &[&SegmentedRecording]) -> bool {
     let slowest = recordings.iter().map(|r| r.speed_mps).fold(f64::INFINITY, f64::min);
     recordings.iter().all(|r| r.speed_mps < slowest * (1.0 + SPEED_TOLERANCE))
 }
 
 /// Whether the recordings have several speeds or strokes.
-#[must_use]
-pub fn have_several_speeds(recordings: &[&SegmentedRecording]) -> bool {
+pub(crate) fn have_several_speeds(recordings: &[&SegmentedRecording]) -> bool {
     group_by_speed_and_stroke(recordings).len() > 1
 }
 

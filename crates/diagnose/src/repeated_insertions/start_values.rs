@@ -6,7 +6,7 @@ use stylet_identify::model::{
     Assumptions, DayParameters, EffectTerm, FreeParameters, Model, NO_RUPTURE, TiedParameter,
 };
 use stylet_stats::order_statistics::median_of;
-use stylet_tissue::{AnyEffect, DelayedPuncture, Effect, ReleaseDepth, ShaftSlip, Tissue};
+use stylet_tissue::{AnyEffect, DelayedPuncture, ReleaseDepth, ShaftSlip, Tissue};
 
 /// Prior standard deviation (m) of the surface about the position at which the force first rises.
 const SURFACE_SD_M: f64 = 1.5e-3;
@@ -70,6 +70,11 @@ struct LayerGeometry {
     indented_m: Vec<f64>,
 }
 
+/// Whether the rate exponent of a `shaft_slip` effect is held constant, as at one speed.
+pub(super) fn is_rate_held(model: &Model, effect: usize) -> bool {
+    model.tied.iter().any(|b| (b.effect, b.parameter, b.tied_to) == (effect, SLIP_RATE_INDEX, None))
+}
+
 /// Median over the recordings that show a value.
 fn median_over(
     recordings: &[&SegmentedRecording],
@@ -124,7 +129,6 @@ fn layer_geometry(assumed: &Tissue, recordings: &[&SegmentedRecording], beyond_m
 }
 
 /// Prior of an indentation without rupture: one linear spring.
-#[must_use]
 pub fn indentation_prior(assumed: &Tissue, run: &SegmentedRecording) -> Assumptions {
     let geometry = layer_geometry(assumed, &[run], 0.0);
     let mut tissue = geometry.tissue;
@@ -138,7 +142,6 @@ pub fn indentation_prior(assumed: &Tissue, run: &SegmentedRecording) -> Assumpti
 }
 
 /// Prior of the base law: stiffness, friction and puncture force from the raw forces, which are accurate to a factor of a few.
-#[must_use]
 pub fn base_law_prior(assumed: &Tissue, recordings: &[&SegmentedRecording]) -> Assumptions {
     let geometry = layer_geometry(assumed, recordings, 0.0);
     let speed = median_over(recordings, &|r| Some(r.speed_mps)).unwrap_or(1e-3).max(1e-5);
@@ -179,7 +182,6 @@ fn first_time_above(run: &SegmentedRecording, force_n: f64) -> f64 {
 
 /// Start model with `shaft_slip`, `delayed_puncture` and `release_depth` in every layer, and ruptures at the force drops. If the plateau of
 /// the shaft is as high as the load of the first layer, this layer may rupture without a drop, where the force first reaches the plateau.
-#[must_use]
 pub fn shaft_slip_start(assumed: &Tissue, recordings: &[&SegmentedRecording], guess: &StartValues) -> Model {
     let LayerGeometry { mut tissue, leaves, fronts_m: fronts, loads_n, indented_m } =
         layer_geometry(assumed, recordings, guess.surface_m);
@@ -228,9 +230,9 @@ pub fn shaft_slip_start(assumed: &Tissue, recordings: &[&SegmentedRecording], gu
         effects.push(ReleaseDepth { layer: l + 1, depth_m }.into());
     }
     let layers = tissue.layers.len();
-    let belief = weak_prior(tissue, leaves);
-    let mut model = Model::base(Arc::new(belief), recordings.len());
-    model.effects = effects.iter().map(|e| EffectTerm::new(e.info(), &e.parameters())).collect();
+    let prior = weak_prior(tissue, leaves);
+    let mut model = Model::base(Arc::new(prior), recordings.len());
+    model.effects = effects.iter().map(EffectTerm::of).collect();
     model.tied = bound;
     model.free = FreeParameters {
         surface: true,

@@ -8,7 +8,7 @@ use super::segmented_recording::{SegmentedRecording, have_one_speed};
 use rand::rngs::ChaCha8Rng;
 use stylet_identify::model::Model;
 use stylet_record::sensor_artefacts::SensorArtefacts;
-use stylet_tissue::{DelayedPuncture, Effect, Tissue};
+use stylet_tissue::{DelayedPuncture, Tissue};
 
 /// Smallest number of starts; about one in five reaches the best optimum.
 const MIN_STARTS: usize = 24;
@@ -38,8 +38,8 @@ pub fn fit_stick_slip(
     if !have_one_speed(recordings) {
         return delayed;
     }
-    let id = DelayedPuncture::default().info().id;
-    let immediate = best_of(&starts.iter().map(|m| without_effect(m, &[], id)).collect::<Vec<_>>());
+    let immediate =
+        best_of(&starts.iter().map(|m| without_effect(m, &[], DelayedPuncture::ID)).collect::<Vec<_>>());
     match (&delayed, &immediate) {
         (Some(w), Some(g)) if is_significant(&relative_losses(&g.scores, &w.scores)) => delayed,
         _ => immediate.or(delayed),

@@ -22,8 +22,7 @@ impl JacobianColumn {
     }
 
     /// Scalar product over all recordings.
-    #[must_use]
-    pub fn dot_all(&self, other: &Self) -> f64 {
+    pub(crate) fn dot_all(&self, other: &Self) -> f64 {
         (0..self.innovations.len()).map(|r| self.dot(other, r)).sum()
     }
 }

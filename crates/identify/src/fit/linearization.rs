@@ -5,7 +5,7 @@ use crate::forward_model::ReplayResult;
 use crate::likelihood::{FitData, ReplayCache, Residuals, replay};
 use crate::model::{Model, NO_RUPTURE, Parameter, ParameterRole};
 use crate::noise::huber_weight;
-use crate::rupture_likelihood::rupture_rows_at;
+use crate::rupture_likelihood::{RuptureEvent, rupture_rows_at};
 use core::ops::Range;
 use stylet_stats::linear_algebra::{CholeskyFactor, SymmetricMatrix, dot};
 use stylet_stats::parallel::*;
@@ -45,7 +45,7 @@ impl Linearization {
         let mut t = Self {
             residual: JacobianColumn {
                 innovations: weighted(&at.innovations, &roots),
-                rupture_rows: event_rows(model, at, at),
+                rupture_rows: rupture_rows(model, at),
             },
             shared,
             per_recording,
@@ -241,8 +241,7 @@ impl Linearization {
     }
 
     /// Scalar products of `c` with all Jacobian columns, in the order of the normal matrix.
-    #[must_use]
-    pub fn products_with(&self, c: &JacobianColumn, recordings: usize) -> Vec<f64> {
+    pub(crate) fn products_with(&self, c: &JacobianColumn, recordings: usize) -> Vec<f64> {
         let ns = self.shared.len();
         let all = |i: usize| (0..recordings).map(|r| self.recording_product(i, c, r)).sum();
         let per_recording = (0..recordings)
@@ -266,13 +265,8 @@ fn weighted(w: &[Vec<f64>], roots: &[Vec<f64>]) -> Vec<Vec<f64>> {
     w.iter().zip(roots).map(|(w, r)| w.iter().zip(r).map(|(w, r)| w * r).collect()).collect()
 }
 
-/// Rupture residuals of `now`, scaled by the standard deviations of `at`.
-fn event_rows(model: &Model, now: &Residuals, at: &Residuals) -> Vec<Vec<f64>> {
-    now.ruptures
-        .iter()
-        .zip(&at.ruptures)
-        .map(|(now, at)| {
-            now.iter().zip(at).flat_map(|(n, a)| rupture_rows_at(n, &model.scatter, a)).collect()
-        })
-        .collect()
+/// Rupture residuals of every recording.
+fn rupture_rows(model: &Model, at: &Residuals) -> Vec<Vec<f64>> {
+    let rows = |e: &RuptureEvent| rupture_rows_at(e, &model.scatter, e);
+    at.ruptures.iter().map(|events| events.iter().flat_map(rows).collect()).collect()
 }

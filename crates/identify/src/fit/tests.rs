@@ -289,8 +289,8 @@ fn a_fit_with_many_outliers_converges_in_a_few_steps() {
     let d = data(&m, 0.15);
     m.tissue.layers[0].stiffness_n_per_m = 170.0;
     m.tissue.layers[0].friction_ns_per_m2 = 3600.0;
-    let to = |turns: usize| {
-        fit(&m, &d, Effort { max_iterations: turns, min_gain_nats: 1e-6 }).expect("a fit").nats()
+    let to = |iterations: usize| {
+        fit(&m, &d, Effort { max_iterations: iterations, min_gain_nats: 1e-6 }).expect("a fit").nats()
     };
     let (end, few) = (to(100), to(4));
     assert!(few - end < 1.0 && to(1) - end > 100.0, "{few} {end} {}", to(1));

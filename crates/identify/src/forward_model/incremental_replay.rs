@@ -1,7 +1,7 @@
 //! Replays models that differ in one base parameter or rupture time, by reusing the unchanged part of a stored replay.
 
 use super::checkpoint::Checkpoint;
-use super::{ReplayResult, advance, initial_checkpoint, replay_with_ruptures};
+use super::{ReplayResult, advance, replay_visiting, replay_with_ruptures};
 use crate::block_averages::BlockAverages;
 use crate::model::{CompiledModel, NO_RUPTURE};
 use crate::motion::MotionPiece;
@@ -23,21 +23,18 @@ impl IncrementalReplay {
         pieces: &[MotionPiece],
         rupture_times: &[f64],
     ) -> Self {
-        let mut replay = Self { rupture_times_s: rupture_times.to_vec(), ..Self::default() };
-        let first = initial_checkpoint(model, blocks, &mut replay.result);
-        let saved = &mut replay.checkpoints;
-        advance(model, blocks, pieces, rupture_times, first, &mut replay.result, &mut |here| {
-            saved.push(here.to_checkpoint());
+        let (mut result, mut checkpoints) = (ReplayResult::default(), Vec::new());
+        replay_visiting(model, blocks, pieces, rupture_times, &mut result, &mut |here| {
+            checkpoints.push(here.checkpoint());
             true
         });
-        replay
+        Self { result, checkpoints, rupture_times_s: rupture_times.to_vec() }
     }
 
     /// The result of [`replay_with_ruptures`] for `now`, which has the same effects and pieces as the model `was` of this replay but
     /// another base parameter or rupture time. Reuses the part before the first possible difference and the part after both states agree
     /// again.
-    #[must_use]
-    pub fn replay_neighbour(
+    pub(crate) fn replay_neighbour(
         &self,
         was: &CompiledModel,
         now: &CompiledModel,
@@ -46,13 +43,12 @@ impl IncrementalReplay {
         rupture_times: &[f64],
     ) -> ReplayResult {
         let first = self.first_difference(was, now, pieces, rupture_times);
-        let at = self.checkpoints.partition_point(|s| s.piece <= first).saturating_sub(1);
+        let at = self.checkpoints.partition_point(|s| s.state.piece <= first).saturating_sub(1);
         let mut out = self.result.clone();
         let Some(start) = self.checkpoints.get(at) else {
             replay_with_ruptures(now, blocks, pieces, rupture_times, &mut out);
             return out;
         };
-        out.ruptures.clone_from(&start.ruptures);
         let done_with = ruptures_until_equal(was, now);
         // The states can agree again only after both rupture times have passed.
         let moved = self.rupture_times_s.iter().zip(rupture_times).filter(|(a, b)| a != b);
@@ -63,16 +59,15 @@ impl IncrementalReplay {
             let known = self.checkpoints.get(next);
             next += 1;
             // The first visit is the start itself, where the states agree trivially.
-            let passed = pieces.get(s.piece).is_some_and(|p| p.start_s > passed_s);
-            if passed
+            let passed = pieces.get(s.state.piece).is_some_and(|p| p.start_s > passed_s);
+            let agrees = passed
                 && next > at + 1
-                && s.stepper.ruptured_layers >= done_with
-                && known.is_some_and(|k| s.same_future_as(k))
-            {
-                same = Some((s.block as usize, s.stepper.ruptured_layers));
-                return false;
+                && s.state.ruptured_layers >= done_with
+                && known.is_some_and(|k| s.continues_like(k));
+            if agrees {
+                same = Some((s.state.block as usize, s.state.ruptured_layers));
             }
-            true
+            !agrees
         });
         if let Some((block, done)) = same {
             out.force_n[block..].copy_from_slice(&self.result.force_n[block..]);

@@ -18,7 +18,7 @@ use crate::block_averages::BlockAverages;
 use crate::model::{CompiledModel, NO_RUPTURE};
 use crate::motion::MotionPiece;
 use crate::rupture_likelihood::RuptureEvent;
-use checkpoint::{Checkpoint, CheckpointView};
+use checkpoint::{Checkpoint, ReplayState};
 use stylet_tissue::ForceLawState;
 use time_stepper::{BlockSamples, TimeStepper, local_acceleration_mps2};
 
@@ -42,31 +42,38 @@ pub fn replay_with_ruptures(
     rupture_times: &[f64],
     out: &mut ReplayResult,
 ) {
-    let first = initial_checkpoint(model, blocks, out);
-    advance(model, blocks, pieces, rupture_times, first, out, &mut |_| true);
+    replay_visiting(model, blocks, pieces, rupture_times, out, &mut |_| true);
 }
 
-/// Clears `out` and returns the initial state of a replay.
-fn initial_checkpoint(model: &CompiledModel, blocks: &BlockAverages, out: &mut ReplayResult) -> Checkpoint {
+/// As [`replay_with_ruptures`]; `visit` as in [`advance`].
+fn replay_visiting(
+    model: &CompiledModel,
+    blocks: &BlockAverages,
+    pieces: &[MotionPiece],
+    rupture_times: &[f64],
+    out: &mut ReplayResult,
+    visit: &mut impl FnMut(&TimeStepper) -> bool,
+) {
     out.force_n.clear();
     out.force_n.resize(blocks.len(), 0.0);
-    out.ruptures.clear();
-    out.ruptures.resize(
-        model.puncture_n.len(),
-        RuptureEvent { sample_step_s: blocks.sample_step_s, ..RuptureEvent::INITIAL },
-    );
-    Checkpoint {
+    advance(model, blocks, pieces, rupture_times, initial_checkpoint(model, blocks), out, visit);
+}
+
+/// Initial state of a replay.
+fn initial_checkpoint(model: &CompiledModel, blocks: &BlockAverages) -> Checkpoint {
+    let intact = RuptureEvent { sample_step_s: blocks.sample_step_s, ..RuptureEvent::INITIAL };
+    let state = ReplayState {
         piece: 0,
-        state: ForceLawState::default(),
-        chain: model.has_measurement_chain.then(|| model.chain.start(0.0)),
         ruptured_layers: 0,
-        threshold_n: f64::INFINITY,
-        transient_until_s: f64::NEG_INFINITY,
-        broken: vec![false; model.break_positions_m.len()],
         block: 0,
         force_integral: 0.0,
-        ruptures: out.ruptures.clone(),
-    }
+        threshold_n: f64::INFINITY,
+        transient_until_s: f64::NEG_INFINITY,
+        law: ForceLawState::default(),
+        chain: model.has_measurement_chain.then(|| model.chain.start(0.0)),
+        broken: vec![false; model.break_positions_m.len()],
+    };
+    Checkpoint { state, ruptures: vec![intact; model.puncture_n.len()] }
 }
 
 /// Continues from a checkpoint; `visit` is called every [`CHECKPOINT_PIECES`] pieces and ends the replay by
@@ -78,67 +85,43 @@ fn advance(
     rupture_times: &[f64],
     from: Checkpoint,
     out: &mut ReplayResult,
-    visit: &mut impl FnMut(&CheckpointView) -> bool,
+    visit: &mut impl FnMut(&TimeStepper) -> bool,
 ) {
-    let Checkpoint {
-        piece: first,
-        state,
-        chain,
-        ruptured_layers: done,
-        threshold_n,
-        transient_until_s: restless_s,
-        mut broken,
-        mut block,
-        force_integral: mut sum,
-        ruptures: events,
-    } = from;
-    out.ruptures = events;
+    out.ruptures = from.ruptures;
     let mut stepper = TimeStepper {
         model,
-        state,
-        chain,
-        ruptured_layers: done,
+        state: from.state,
         ruptures: &mut out.ruptures,
         sample_step_s: blocks.sample_step_s,
-        threshold_n,
-        transient_until_s: restless_s,
         samples: BlockSamples::default(),
     };
     let end_s = pieces.last().map_or(0.0, |p| p.end_s);
-    for (index, piece) in pieces.iter().enumerate().skip(first) {
-        if index % CHECKPOINT_PIECES == 0 {
-            let here = CheckpointView {
-                piece: index,
-                stepper: &stepper,
-                broken: &broken,
-                block,
-                force_integral: sum,
-            };
-            if !visit(&here) {
-                return;
-            }
+    for (index, piece) in pieces.iter().enumerate().skip(stepper.state.piece) {
+        stepper.state.piece = index;
+        if index % CHECKPOINT_PIECES == 0 && !visit(&stepper) {
+            return;
         }
-        if piece.block != block {
-            let k = block as usize;
-            out.force_n[k] = sum / (blocks.end_s[k] - blocks.start_s[k]);
-            (block, sum) = (piece.block, 0.0);
+        if piece.block != stepper.state.block {
+            let k = stepper.state.block as usize;
+            out.force_n[k] = stepper.state.force_integral / (blocks.end_s[k] - blocks.start_s[k]);
+            (stepper.state.block, stepper.state.force_integral) = (piece.block, 0.0);
         }
         if model.smears_jumps {
-            stepper.samples = BlockSamples::new(blocks, block as usize);
+            stepper.samples = BlockSamples::new(blocks, piece.block as usize);
         }
         if let Some(before) = index.checked_sub(1).and_then(|k| pieces.get(k)) {
             stepper.cross_piece_boundary(before, piece);
         }
         let mut at = piece.start_s;
         loop {
-            let rupture = rupture_times.get(stepper.ruptured_layers).copied().unwrap_or(NO_RUPTURE);
-            let breaks = next_break(model, piece, at, &mut broken);
+            let rupture = rupture_times.get(stepper.state.ruptured_layers).copied().unwrap_or(NO_RUPTURE);
+            let breaks = next_break(model, piece, at, &mut stepper.state.broken);
             let next = rupture.min(breaks);
             if next < piece.end_s || (rupture <= piece.end_s && piece.end_s >= end_s && rupture < NO_RUPTURE)
             {
                 let next = next.max(at).min(piece.end_s);
                 if next > at {
-                    sum += stepper.force_integral(piece, at, next);
+                    stepper.add_force(piece, at, next);
                     at = next;
                 }
                 if breaks <= rupture {
@@ -150,13 +133,14 @@ fn advance(
                 continue;
             }
             if piece.end_s > at {
-                sum += stepper.force_integral(piece, at, piece.end_s);
+                stepper.add_force(piece, at, piece.end_s);
             }
             break;
         }
     }
-    if let Some(k) = Some(block as usize).filter(|k| *k < out.force_n.len()) {
-        out.force_n[k] = sum / (blocks.end_s[k] - blocks.start_s[k]);
+    let last = stepper.state.block as usize;
+    if let Some(force_n) = out.force_n.get_mut(last) {
+        *force_n = stepper.state.force_integral / (blocks.end_s[last] - blocks.start_s[last]);
     }
 }
 
@@ -165,8 +149,7 @@ fn advance(
 fn next_break(model: &CompiledModel, piece: &MotionPiece, at_s: f64, broken: &mut [bool]) -> f64 {
     let mut first = (NO_RUPTURE, usize::MAX);
     for (k, place) in model.break_positions_m.iter().enumerate().filter(|(k, _)| !broken[*k]) {
-        let (z0, z1) =
-            (piece.at(at_s).0 * model.true_over_recorded, piece.at(piece.end_s).0 * model.true_over_recorded);
+        let (z0, z1) = (model.true_motion(piece, at_s).0, model.true_motion(piece, piece.end_s).0);
         if z1 >= *place {
             let share = if z1 > z0 { ((place - z0) / (z1 - z0)).clamp(0.0, 1.0) } else { 0.0 };
             let at = at_s + share * (piece.end_s - at_s);
@@ -205,8 +188,8 @@ pub fn free_rupture_times(model: &CompiledModel, pieces: &[MotionPiece]) -> Vec<
     let mut rupture_times = vec![NO_RUPTURE; model.puncture_n.len()];
     for piece in pieces {
         for t in [0.75 * piece.start_s + 0.25 * piece.end_s, 0.25 * piece.start_s + 0.75 * piece.end_s] {
-            let (z, v) = piece.at(t);
-            model.law.step(&mut state, t, z * model.true_over_recorded, v * model.true_over_recorded, |r| {
+            let (z, v) = model.true_motion(piece, t);
+            model.law.step(&mut state, t, z, v, |r| {
                 if let Some(instant) = rupture_times.get_mut(r.layer - 1) {
                     *instant = r.time_s;
                 }

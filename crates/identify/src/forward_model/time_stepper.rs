@@ -1,23 +1,18 @@
 //! Steps tissue model and measurement chain along the motion.
 
+use super::checkpoint::{Checkpoint, ReplayState};
 use crate::block_averages::BlockAverages;
 use crate::model::CompiledModel;
 use crate::motion::{MIN_JUMP_MPS, MotionPiece};
 use crate::rupture_likelihood::RuptureEvent;
-use stylet_tissue::{AveragingInterval, ForceLawState, MeasurementState, RuptureCriterion};
+use stylet_tissue::{AveragingInterval, RuptureCriterion};
 
-/// State of a replay.
+/// A running replay.
 pub(super) struct TimeStepper<'a> {
     pub(super) model: &'a CompiledModel,
-    pub(super) state: ForceLawState,
-    pub(super) chain: Option<MeasurementState>,
-    pub(super) ruptured_layers: usize,
+    pub(super) state: ReplayState,
     pub(super) ruptures: &'a mut Vec<RuptureEvent>,
     pub(super) sample_step_s: f64,
-    /// Puncture force in N of the active layer in the previous span.
-    pub(super) threshold_n: f64,
-    /// Until this time (s) a compliant needle or a lagging sensor is in transient after a jump.
-    pub(super) transient_until_s: f64,
     /// Sample times of the current block if jumps are low-pass filtered, else empty.
     pub(super) samples: BlockSamples<'a>,
 }
@@ -63,26 +58,34 @@ const SAME_MOTION_SHARE: f64 = 0.3;
 const THRESHOLD_JUMP_SHARE: f64 = 0.01;
 
 impl TimeStepper<'_> {
+    pub(super) fn checkpoint(&self) -> Checkpoint {
+        Checkpoint { state: self.state.clone(), ruptures: self.ruptures.clone() }
+    }
+
+    /// Whether this replay continues like one from `other`. The strain of ruptured layers has no further effect.
+    pub(super) fn continues_like(&self, other: &Checkpoint) -> bool {
+        let done = self.state.ruptured_layers;
+        self.state == other.state && self.ruptures.get(done..) == other.ruptures.get(done..)
+    }
+
+    /// Adds a span of smooth motion to the integral of the force.
+    pub(super) fn add_force(&mut self, piece: &MotionPiece, from_s: f64, to_s: f64) {
+        self.state.force_integral += self.force_integral(piece, from_s, to_s);
+    }
+
     /// Integral of the force over a span of smooth motion, in N s.
-    pub(super) fn force_integral(&mut self, piece: &MotionPiece, from_s: f64, to_s: f64) -> f64 {
-        let fast = from_s < self.transient_until_s || !self.samples.covered_by(from_s, to_s);
+    fn force_integral(&mut self, piece: &MotionPiece, from_s: f64, to_s: f64) -> f64 {
+        let fast = from_s < self.state.transient_until_s || !self.samples.covered_by(from_s, to_s);
         if fast && !self.samples.time_s.is_empty() {
             return self.sampled_force_integral(piece, from_s, to_s);
         }
         let t = 0.5 * (from_s + to_s);
         let total_n = self.law_force(piece, t);
         let span_s = to_s - from_s;
-        let Some(chain) = &mut self.chain else { return total_n * span_s };
-        let cell = AveragingInterval {
-            time_s: t,
-            span_s,
-            samples: span_s / self.sample_step_s,
-            position_m: piece.at(t).0 * self.model.true_over_recorded,
-            velocity_mps: piece.at(t).1 * self.model.true_over_recorded,
-            acceleration_mps2: piece.acceleration_mps2 * self.model.true_over_recorded,
-            tissue_n: total_n,
-        };
-        self.model.chain.mean_force(chain, &cell) * span_s
+        let Some(chain) = &mut self.state.chain else { return total_n * span_s };
+        let interval = averaging_interval(self.model, piece, t, span_s, total_n);
+        let interval = AveragingInterval { samples: span_s / self.sample_step_s, ..interval };
+        self.model.chain.mean_force(chain, &interval) * span_s
     }
 
     /// The same for a span in transient: sum over the samples, each times the time it represents.
@@ -102,31 +105,22 @@ impl TimeStepper<'_> {
         // A first-order lag responds to the mean force over the interval.
         let lags = self.model.chain.has_lag();
         let total_n = self.law_force(piece, if lags { 0.5 * (from_s + to_s) } else { to_s });
-        let Some(chain) = &mut self.chain else { return total_n };
-        let cell = AveragingInterval {
-            time_s: to_s,
-            span_s: to_s - from_s,
-            samples: 1.0,
-            position_m: piece.at(to_s).0 * self.model.true_over_recorded,
-            velocity_mps: piece.at(to_s).1 * self.model.true_over_recorded,
-            acceleration_mps2: piece.acceleration_mps2 * self.model.true_over_recorded,
-            tissue_n: total_n,
-        };
-        self.model.chain.force_at_end(chain, &cell)
+        let Some(chain) = &mut self.state.chain else { return total_n };
+        let interval = averaging_interval(self.model, piece, to_s, to_s - from_s, total_n);
+        self.model.chain.force_at_end(chain, &interval)
     }
 
     /// Tissue force in N at a time of a piece.
     fn law_force(&mut self, piece: &MotionPiece, at_s: f64) -> f64 {
-        let (z, v) = piece.at(at_s);
-        let (z, v) = (z * self.model.true_over_recorded, v * self.model.true_over_recorded);
+        let (z, v) = self.model.true_motion(piece, at_s);
         let ruptures = &mut self.ruptures[..];
-        let threshold = &mut self.threshold_n;
+        let ReplayState { law, threshold_n, ruptured_layers, .. } = &mut self.state;
+        law.set_base_acceleration(piece.acceleration_mps2 * self.model.true_over_recorded);
         let record = |s: RuptureCriterion| {
             record_strain(ruptures, &s);
-            *threshold = s.puncture_n;
+            *threshold_n = s.puncture_n;
         };
-        self.state.set_base_acceleration(piece.acceleration_mps2 * self.model.true_over_recorded);
-        self.model.law.step_imposed(&mut self.state, at_s, z, v, self.ruptured_layers, record).total_n
+        self.model.law.step_imposed(law, at_s, z, v, *ruptured_layers, record).total_n
     }
 
     /// Crosses the border between two pieces. If the velocity jumps, the model is stepped exactly to the border, because a compliant needle
@@ -145,7 +139,7 @@ impl TimeStepper<'_> {
     /// Marks the start of a transient if the force is low-pass filtered.
     pub(super) fn mark_jump(&mut self, at_s: f64) {
         if self.model.smears_jumps {
-            self.transient_until_s = at_s + TRANSIENT_S;
+            self.state.transient_until_s = at_s + TRANSIENT_S;
         }
     }
 
@@ -157,20 +151,19 @@ impl TimeStepper<'_> {
         at_s: f64,
         acceleration_mps2: f64,
     ) {
-        let (z, v) = piece.at(at_s);
-        let (z, v) = (z * self.model.true_over_recorded, v * self.model.true_over_recorded);
-        let layer = self.ruptured_layers;
+        let (z, v) = self.model.true_motion(piece, at_s);
+        let layer = self.state.ruptured_layers;
         let (mut strained, mut tip_v) = (None, v);
         // Force just before.
         let excess_before = self.ruptures.get(layer).map_or(f64::NEG_INFINITY, |e| e.force_excess);
         let before = &mut self.ruptures[..];
-        self.model.law.step_imposed(&mut self.state, at_s, z, v, layer, |s| {
+        self.model.law.step_imposed(&mut self.state.law, at_s, z, v, layer, |s| {
             record_strain(before, &s);
             if s.layer == layer + 1 {
                 strained = Some(s);
             }
         });
-        let (law, state) = (&self.model.law, self.state);
+        let (law, state) = (&self.model.law, self.state.law);
         let threshold_n = |v_mps: f64| {
             let mut then = f64::INFINITY;
             law.step_imposed(&mut { state }, at_s, z, v_mps, layer, |s| then = s.puncture_n);
@@ -181,7 +174,8 @@ impl TimeStepper<'_> {
             && s.puncture_n.is_finite()
         {
             let jumped = |to: f64, from: f64| (to / from - 1.0).abs() > THRESHOLD_JUMP_SHARE;
-            if jumped(s.puncture_n, self.threshold_n) && excess_before < 0.0 && event.force_excess > 0.0 {
+            if jumped(s.puncture_n, self.state.threshold_n) && excess_before < 0.0 && event.force_excess > 0.0
+            {
                 event.force_excess = 0.0;
             } else if let Some(next) =
                 after.filter(|_| event.force_excess < 0.0 && piece.end_s - at_s < self.sample_step_s)
@@ -193,8 +187,8 @@ impl TimeStepper<'_> {
                 }
             }
         }
-        if self.state.tip_velocity_mps().is_finite() {
-            tip_v = self.state.tip_velocity_mps();
+        if self.state.law.tip_velocity_mps().is_finite() {
+            tip_v = self.state.law.tip_velocity_mps();
         }
         if let (Some(s), Some(event)) = (strained, self.ruptures.get_mut(layer)) {
             event.ruptured = true;
@@ -215,15 +209,35 @@ impl TimeStepper<'_> {
                 0.0
             };
         }
-        self.ruptured_layers += 1;
+        self.state.ruptured_layers += 1;
         self.mark_jump(at_s);
         // Strain of the deeper layers just after the release.
         let after = &mut self.ruptures[..];
-        self.model.law.step_imposed(&mut self.state, at_s, z, v, self.ruptured_layers, |s| {
+        self.model.law.step_imposed(&mut self.state.law, at_s, z, v, self.state.ruptured_layers, |s| {
             if s.layer > layer + 1 {
                 record_strain(after, &s);
             }
         });
+    }
+}
+
+/// Input of the measurement chain for one sample in a span of `span_s`, at a time of a piece.
+fn averaging_interval(
+    model: &CompiledModel,
+    piece: &MotionPiece,
+    at_s: f64,
+    span_s: f64,
+    tissue_n: f64,
+) -> AveragingInterval {
+    let (position_m, velocity_mps) = model.true_motion(piece, at_s);
+    AveragingInterval {
+        time_s: at_s,
+        span_s,
+        samples: 1.0,
+        position_m,
+        velocity_mps,
+        acceleration_mps2: piece.acceleration_mps2 * model.true_over_recorded,
+        tissue_n,
     }
 }
 

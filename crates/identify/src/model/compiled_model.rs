@@ -1,4 +1,5 @@
 use super::{DayParameters, EffectTerm, Model, RecordingParameters};
+use crate::motion::MotionPiece;
 use stylet_tissue::{ChainStage, Effect, ForceLaw, MeasurementChain};
 
 /// A model ready to be replayed over one recording.
@@ -23,6 +24,14 @@ pub struct CompiledModel {
     pub puncture_n: Vec<f64>,
     /// Stiffness of every layer in N/m.
     pub stiffness_n_per_m: Vec<f64>,
+}
+
+impl CompiledModel {
+    /// True position (m) and velocity (m/s) at a time of a piece.
+    pub(crate) fn true_motion(&self, piece: &MotionPiece, at_s: f64) -> (f64, f64) {
+        let (z, v) = piece.at(at_s);
+        (z * self.true_over_recorded, v * self.true_over_recorded)
+    }
 }
 
 impl Model {
@@ -77,8 +86,7 @@ impl Model {
     }
 
     /// Whether an effect acts on the friction along the shaft.
-    #[must_use]
-    pub fn has_friction_effects(&self) -> bool {
+    pub(crate) fn has_friction_effects(&self) -> bool {
         self.effects
             .iter()
             .filter_map(EffectTerm::effect)

@@ -1,4 +1,4 @@
-use stylet_tissue::{AnyEffect, EffectInfo};
+use stylet_tissue::{AnyEffect, Effect, EffectInfo};
 
 /// An effect of the model: library entry and parameter values in the library's order.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +14,12 @@ impl EffectTerm {
     #[must_use]
     pub fn new(info: &'static EffectInfo, values: &[f64]) -> Self {
         Self { info, values: values.to_vec() }
+    }
+
+    /// The term of an effect.
+    #[must_use]
+    pub fn of(effect: &AnyEffect) -> Self {
+        Self { info: effect.info(), values: effect.parameters() }
     }
 
     /// The effect as the tissue model takes it; `None` when the values are invalid.

@@ -37,8 +37,7 @@ pub enum ParameterRole {
 
 impl ParameterRole {
     /// Whether every recording has its own value.
-    #[must_use]
-    pub fn is_per_recording(self) -> bool {
+    pub(crate) fn is_per_recording(self) -> bool {
         matches!(
             self,
             ParameterRole::RecordingSurface
@@ -65,4 +64,19 @@ pub struct Parameter {
     pub prior_sd: f64,
     /// Step of the finite difference.
     pub step: f64,
+}
+
+impl Parameter {
+    /// Negative log prior (nats) of a value, without normalisation; zero for a flat prior.
+    #[must_use]
+    pub fn prior_nats(&self, x: f64) -> f64 {
+        if self.prior_sd.is_finite() { 0.5 * ((x - self.prior_mean) / self.prior_sd).powi(2) } else { 0.0 }
+    }
+
+    /// Whether a value is within `tolerance` of a bound, as a share of the range (of at most one).
+    #[must_use]
+    pub fn is_at_bound(&self, x: f64, tolerance: f64) -> bool {
+        let margin = tolerance * (self.high - self.low).min(1.0);
+        x <= self.low + margin || x >= self.high - margin
+    }
 }

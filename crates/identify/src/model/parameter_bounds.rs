@@ -117,8 +117,7 @@ impl Model {
     }
 
     /// The library's value of this standard deviation.
-    #[must_use]
-    pub fn library_varying_sd(&self, k: usize) -> f64 {
+    pub(crate) fn library_varying_sd(&self, k: usize) -> f64 {
         self.varying_parameters()
             .nth(k)
             .map_or(1.0, |(e, p)| self.effects[e].info.parameters[p].between_recordings_sd)

@@ -21,12 +21,12 @@ mod velocity_estimate;
 
 pub use jump_timing::JumpTiming;
 pub use motion_pieces::{JumpAppearance, MotionPiece};
-pub use smooth_positions::{SmoothedMotion, smooth_positions};
-pub use velocity_estimate::{MIN_JUMP_MPS, VelocityEstimate, VelocityJump, estimate_velocity};
+use smooth_positions::smooth_positions;
+pub use velocity_estimate::MIN_JUMP_MPS;
 
 use interpolant::Interpolant;
 use stylet_record::Recording;
-use velocity_estimate::position_noise;
+use velocity_estimate::{VelocityJump, estimate_velocity, position_noise};
 
 /// Motion of one recording.
 #[derive(Clone, Debug, Default)]

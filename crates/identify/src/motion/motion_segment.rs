@@ -4,7 +4,8 @@
 //! largest force error. A parametric segment estimates a few parameters from all samples of an interval, and its velocity is a hundred
 //! times more accurate. Intervals whose residuals are not white under any form are smoothed by local windows (`smooth_positions`).
 
-use core::f64::consts::{PI, TAU};
+use core::f64::consts::TAU;
+use stylet_stats::golden_section;
 use stylet_stats::least_squares::NormalEquations;
 
 /// Highest frequency (Hz) that is searched; faster motion is left to local windows.
@@ -232,24 +233,10 @@ impl<'a> SegmentFit<'a> {
 
     /// As [`add_sinusoid`](Self::add_sinusoid), within `within_hz` of `hz`, by golden section over all cells.
     fn refine_frequency(&self, others: &[f64], hz: f64, within_hz: f64) -> Option<MotionSegment> {
-        let (mut lo, mut hi) = ((hz - within_hz).max(1e-4), hz + within_hz);
-        let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
         let all = |hz: f64| self.sum_of_squares(others, hz, self.t, self.z, self.cell_s);
-        let (mut a, mut b) = (hi - ratio * (hi - lo), lo + ratio * (hi - lo));
-        let (mut fa, mut fb) = (all(a), all(b));
-        for _ in 0..24 {
-            if fa < fb {
-                (hi, b, fb) = (b, a, fa);
-                a = hi - ratio * (hi - lo);
-                fa = all(a);
-            } else {
-                (lo, a, fa) = (a, b, fb);
-                b = lo + ratio * (hi - lo);
-                fb = all(b);
-            }
-        }
+        let best_hz = golden_section(all, ((hz - within_hz).max(1e-4), hz + within_hz), 24);
         let mut sinusoids = others.to_vec();
-        sinusoids.push(PI * (lo + hi));
+        sinusoids.push(TAU * best_hz);
         self.fit(1, &sinusoids)
     }
 

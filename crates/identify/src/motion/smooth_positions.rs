@@ -33,8 +33,7 @@ pub struct SmoothedMotion {
 }
 
 /// Smooths positions `z` (m) at times `t` (s).
-#[must_use]
-pub fn smooth_positions(t: &[f64], z: &[f64]) -> SmoothedMotion {
+pub(crate) fn smooth_positions(t: &[f64], z: &[f64]) -> SmoothedMotion {
     let n = t.len().min(z.len());
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
     let step = median(&mut steps).max(1e-9);

@@ -48,8 +48,7 @@ pub struct VelocityEstimate {
 }
 
 /// Estimates the velocity from positions `z` (m) at times `t` (s).
-#[must_use]
-pub fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
+pub(crate) fn estimate_velocity(t: &[f64], z: &[f64]) -> VelocityEstimate {
     let n = t.len().min(z.len());
     if n < 8 {
         return VelocityEstimate {

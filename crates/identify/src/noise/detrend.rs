@@ -10,8 +10,7 @@ const DETREND_WINDOW_S: f64 = 1.0;
 /// Residuals (N) minus a least-squares parabola in windows of [`DETREND_WINDOW_S`]. Windows whose variance exceeds 2.5 times the median
 /// over the eight windows on either side are set to NaN.
 pub(super) fn detrended_residuals(b: &BlockAverages, e: &[f64]) -> Vec<f64> {
-    let length =
-        (DETREND_WINDOW_S / (b.sample_step_s * b.samples_per_block as f64)).round().max(8.0) as usize;
+    let length = (DETREND_WINDOW_S / b.block_s()).round().max(8.0) as usize;
     let n = b.len();
     let mut out = vec![f64::NAN; n];
     let mut windows: Vec<(usize, usize, f64)> = Vec::new();

@@ -105,31 +105,20 @@ impl Noise {
         };
         // A slow drift that the data do not exclude widens confidence intervals, so the largest stationary order is used.
         let largest = from.has_long_memory();
-        let turns = if from == NoiseSource::Bootstrap { 1 } else { IRLS_ITERATIONS };
+        let iterations = if from == NoiseSource::Bootstrap { 1 } else { IRLS_ITERATIONS };
         for order in (0..=most).map(|k| if largest { most - k } else { k }) {
             let columns: Vec<usize> = (1..=order).collect();
-            let (a, s) = robust_linear_prediction(&rows, &columns, (sd_n, floor_n), HUBER_K, turns);
-            let (near, slow) = a[1..].split_at(AR_ORDER);
-            if !stationary(near) || (order > AR_ORDER && a[1..].iter().sum::<f64>() > 0.999) {
+            let (a, s) = robust_linear_prediction(&rows, &columns, (sd_n, floor_n), HUBER_K, iterations);
+            let (ar, long_memory) = split(&a);
+            if !stationary(&ar) || (order > AR_ORDER && a[1..].iter().sum::<f64>() > 0.999) {
                 continue;
             }
-            let near: [f64; AR_ORDER] = core::array::from_fn(|i| near[i]);
-            let slow: [f64; STRETCHES.len()] = core::array::from_fn(|i| slow[i]);
             let loss: f64 = rows.iter().map(|row| huber_loss(prediction_residual(row, &a) / s)).sum::<f64>()
                 + n * libm::log(s);
             let cost = loss + 0.5 * order as f64 * libm::log(n);
             if best.is_none_or(|b| cost < b.0) {
-                let first = [AfterBreak::without_history(sd_n.max(s)); AR_ORDER];
-                best = Some((
-                    cost,
-                    ForceBinNoise {
-                        ar: near,
-                        long_memory: slow,
-                        innovation_sd_n: s,
-                        sd_n,
-                        after_break: first,
-                    },
-                ));
+                let after_break = [AfterBreak::without_history(sd_n.max(s)); AR_ORDER];
+                best = Some((cost, ForceBinNoise { ar, long_memory, innovation_sd_n: s, sd_n, after_break }));
             }
             if largest {
                 break;
@@ -140,17 +129,18 @@ impl Noise {
             // Predictors of the first blocks after a break use the blocks since the break and those before it.
             for (run, first) in best.after_break.iter_mut().enumerate() {
                 let columns: Vec<usize> = (1..=run).chain(AR_ORDER + 1..ROW_LEN).collect();
-                let (a, s) = robust_linear_prediction(&rows, &columns, (sd_n, floor_n), HUBER_K, turns);
-                let (near, slow) = a[1..].split_at(AR_ORDER);
-                *first = AfterBreak {
-                    ar: core::array::from_fn(|i| near[i]),
-                    long_memory: core::array::from_fn(|i| slow[i]),
-                    sd_n: s.max(best.innovation_sd_n),
-                };
+                let (a, s) = robust_linear_prediction(&rows, &columns, (sd_n, floor_n), HUBER_K, iterations);
+                let (ar, long_memory) = split(&a);
+                *first = AfterBreak { ar, long_memory, sd_n: s.max(best.innovation_sd_n) };
             }
         }
         best
     }
+}
+
+/// Coefficients of the predecessors and of the stretch means, from those of a regression row.
+fn split(a: &[f64; ROW_LEN]) -> ([f64; AR_ORDER], [f64; STRETCHES.len()]) {
+    (core::array::from_fn(|i| a[1 + i]), core::array::from_fn(|i| a[1 + AR_ORDER + i]))
 }
 
 /// Whether a process with these coefficients, newest first, is stationary (Schur-Cohn criterion by Levinson's recursion

@@ -57,8 +57,7 @@ impl Noise {
     }
 
     /// Index of the range in which a force magnitude lies.
-    #[must_use]
-    pub fn bin_index(&self, size_n: f64) -> usize {
+    pub(crate) fn bin_index(&self, size_n: f64) -> usize {
         self.edges_n.iter().take_while(|e| **e <= size_n).count()
     }
 

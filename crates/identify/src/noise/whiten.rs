@@ -10,8 +10,6 @@ pub struct WhiteningPlan {
     rows: Vec<BlockWhitening>,
     /// Whether any force range has a long memory.
     has_long_memory: bool,
-    /// Runs (first, end, range) of blocks in one range with [`AR_ORDER`] predecessors and without long memory.
-    plain_runs: Vec<(usize, usize, u32)>,
 }
 
 /// Whitening of one block.
@@ -25,12 +23,13 @@ struct BlockWhitening {
     memory_blocks: u32,
     /// Standard deviation of the innovation in N; infinite when the block is not compared.
     sd_n: f64,
+    /// Whether the prediction is that of the autoregression alone, from [`AR_ORDER`] predecessors.
+    is_plain: bool,
 }
 
 impl Noise {
     /// Computes the whitening plan of a recording.
-    #[must_use]
-    pub fn whitening_plan(&self, b: &BlockAverages) -> WhiteningPlan {
+    pub(crate) fn whitening_plan(&self, b: &BlockAverages) -> WhiteningPlan {
         let mut run = 0;
         let lasting = self.long_memory;
         let rows = (0..b.len()).map(|k| {
@@ -41,6 +40,7 @@ impl Noise {
                     blocks_since_break: 0,
                     memory_blocks: 0,
                     sd_n: f64::INFINITY,
+                    is_plain: false,
                 };
             }
             let bin = self.bin_index(b.abs_force_n[k]).min(self.bins.len() - 1);
@@ -52,82 +52,53 @@ impl Noise {
                 blocks_since_break: run as u32,
                 memory_blocks: if lasting { k as u32 } else { run as u32 },
                 sd_n,
+                is_plain: run >= AR_ORDER && !of.has_long_memory(),
             }
         });
-        let rows: Vec<BlockWhitening> = rows.collect();
-        let mut even: Vec<(usize, usize, u32)> = Vec::new();
-        for (k, row) in rows.iter().enumerate() {
-            if row.sd_n == f64::INFINITY
-                || (row.blocks_since_break as usize) < AR_ORDER
-                || self.bins[row.bin as usize].has_long_memory()
-            {
-                continue;
-            }
-            match even.last_mut() {
-                Some((_, end, bin)) if *end == k && *bin == row.bin => *end += 1,
-                _ => even.push((k, k + 1, row.bin)),
-            }
-        }
-        WhiteningPlan {
-            rows,
-            has_long_memory: self.bins.iter().any(ForceBinNoise::has_long_memory),
-            plain_runs: even,
-        }
+        let rows = rows.collect();
+        WhiteningPlan { rows, has_long_memory: self.bins.iter().any(ForceBinNoise::has_long_memory) }
     }
 
     /// Normalised innovations of residuals `e` (N) of a recording; zero in blocks that are not compared.
     #[must_use]
-    pub fn whiten(&self, laid: &WhiteningPlan, e: &[f64]) -> Vec<f64> {
-        let sums = match (laid.has_long_memory, self.long_memory) {
+    pub fn whiten(&self, plan: &WhiteningPlan, e: &[f64]) -> Vec<f64> {
+        let sums = match (plan.has_long_memory, self.long_memory) {
             (false, _) => Vec::new(),
             (true, false) => running_sums(e, |_| true),
-            (true, true) => running_sums(e, |k| laid.rows[k].sd_n.is_finite()),
+            (true, true) => running_sums(e, |k| plan.rows[k].sd_n.is_finite()),
         };
         let one = |k: usize, row: &BlockWhitening| {
             if row.sd_n == f64::INFINITY {
                 return 0.0;
             }
-            let (near, slow) = self.predictor(row);
+            let (ar, long_memory) = self.predictor(row);
+            let run = AR_ORDER.min(row.blocks_since_break as usize);
             let mut w = e[k];
-            for (a, before) in
-                near.iter().zip(e[k - AR_ORDER.min(row.blocks_since_break as usize)..k].iter().rev())
-            {
+            for (a, before) in ar.iter().zip(e[k - run..k].iter().rev()) {
                 w -= a * before;
             }
-            if laid.has_long_memory && *slow != [0.0; STRETCHES.len()] {
-                for (mean, slow) in stretch_means(&sums, k, row.memory_blocks as usize).iter().zip(slow) {
-                    w -= slow * mean;
+            if plan.has_long_memory && *long_memory != [0.0; STRETCHES.len()] {
+                let means = stretch_means(&sums, k, row.memory_blocks as usize);
+                for (mean, a) in means.iter().zip(long_memory) {
+                    w -= a * mean;
                 }
             }
             w / row.sd_n
         };
         let mut out = vec![0.0; e.len()];
         // Whitened values are zero before the first non-zero residual, and after the last one beyond the memory.
-        let reach = if laid.has_long_memory { STRETCHES[STRETCHES.len() - 1].1 } else { AR_ORDER };
+        let reach = if plan.has_long_memory { STRETCHES[STRETCHES.len() - 1].1 } else { AR_ORDER };
         let first = e.iter().position(|e| *e != 0.0).unwrap_or(e.len());
         let end = e.iter().rposition(|e| *e != 0.0).map_or(0, |k| (k + 1 + reach).min(e.len()));
-        let mut at = first;
-        for &(from, to, bin) in laid.plain_runs.iter().chain([&(e.len(), e.len(), 0)]) {
-            let (from, to) = (from.clamp(first, end.max(first)), to.min(end));
-            for k in at..from {
-                out[k] = one(k, &laid.rows[k]);
-            }
-            if from >= to {
-                at = at.max(from);
-                continue;
-            }
-            let a = &self.bins[bin as usize].ar;
-            let rows = &laid.rows[from..to];
-            for ((out, row), e) in
-                out[from..to].iter_mut().zip(rows).zip(e[from - AR_ORDER..to].windows(AR_ORDER + 1))
-            {
-                let mut w = e[AR_ORDER];
-                for i in 0..AR_ORDER {
-                    w -= a[i] * e[AR_ORDER - 1 - i];
+        for k in first..end {
+            let row = &plan.rows[k];
+            out[k] = match e[..k].last_chunk::<AR_ORDER>().filter(|_| row.is_plain) {
+                Some(before) => {
+                    let ar = &self.bins[row.bin as usize].ar;
+                    (0..AR_ORDER).fold(e[k], |w, i| w - ar[i] * before[AR_ORDER - 1 - i]) / row.sd_n
                 }
-                *out = w / row.sd_n;
-            }
-            at = to;
+                None => one(k, row),
+            };
         }
         out
     }
@@ -135,10 +106,10 @@ impl Noise {
     /// Residuals (N) of a recording with normalised innovations `w`: the inverse of [`whiten`](Self::whiten),
     /// zero in blocks that are not compared.
     #[must_use]
-    pub fn unwhiten(&self, laid: &WhiteningPlan, w: &[f64]) -> Vec<f64> {
+    pub fn unwhiten(&self, plan: &WhiteningPlan, w: &[f64]) -> Vec<f64> {
         let mut e = vec![0.0; w.len()];
         let mut sums = vec![0.0; w.len() + 1];
-        for (k, row) in laid.rows.iter().enumerate() {
+        for (k, row) in plan.rows.iter().enumerate() {
             if row.sd_n.is_finite() {
                 let (near, slow) = self.predictor(row);
                 let run = AR_ORDER.min(row.blocks_since_break as usize);
@@ -146,7 +117,7 @@ impl Noise {
                 for (a, before) in near.iter().zip(e[k - run..k].iter().rev()) {
                     x += a * before;
                 }
-                if laid.has_long_memory {
+                if plan.has_long_memory {
                     let means = stretch_means(&sums, k, row.memory_blocks as usize);
                     x += means.iter().zip(slow).map(|(mean, slow)| slow * mean).sum::<f64>();
                 }

@@ -99,7 +99,13 @@ impl QualityNote {
         Self { blocking: true, ..Self::new(kind, message, numbers) }
     }
 
-    pub(crate) fn new<const N: usize>(kind: QualityKind, message: String, numbers: [(&str, f64); N]) -> Self {
+    /// A note with its numbers by name, without lines, that does not block a diagnosis.
+    #[must_use]
+    pub fn new<'a>(
+        kind: QualityKind,
+        message: String,
+        numbers: impl IntoIterator<Item = (&'a str, f64)>,
+    ) -> Self {
         let numbers = numbers.into_iter().map(|(name, value)| (name.to_owned(), value)).collect();
         Self { kind, message, numbers, lines: Vec::new(), blocking: false }
     }

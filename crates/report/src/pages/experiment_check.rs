@@ -3,7 +3,7 @@
 use crate::page_model::{Cell, Page, Section, Status, Table};
 use crate::pages::formatting::{effect_label, strength_parameters};
 use std::collections::BTreeMap;
-use stylet_diagnose::check_json::{CheckItem, EffectVisibility, Light};
+use stylet_diagnose::check_json::{CheckItem, EffectVisibility, Rating};
 use stylet_diagnose::claims::parameter_name;
 use stylet_diagnose::experiment_check::ExperimentCheck;
 use stylet_scenario::Scenario;
@@ -14,7 +14,7 @@ use stylet_stats::number_format::significant;
 pub fn summary_sentence(check: &ExperimentCheck) -> &'static str {
     if !check.is_usable() {
         "A diagnosis of these recordings would mean nothing."
-    } else if check.items.iter().all(|item| item.light == Light::Good) {
+    } else if check.items.iter().all(|item| item.light == Rating::Good) {
         "The recordings suffice for a diagnosis."
     } else {
         "A diagnosis is possible, within the limits below."
@@ -25,9 +25,9 @@ pub fn summary_sentence(check: &ExperimentCheck) -> &'static str {
 pub(crate) fn items_table(items: &[CheckItem]) -> Table {
     let row = |item: &CheckItem| {
         let status = match item.light {
-            Light::Good => Status::Good,
-            Light::Limited => Status::Warn,
-            Light::Unusable => Status::Bad,
+            Rating::Good => Status::Good,
+            Rating::Limited => Status::Warn,
+            Rating::Unusable => Status::Bad,
         };
         vec![
             Cell::text(item.topic.clone()),

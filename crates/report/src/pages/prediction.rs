@@ -62,7 +62,8 @@ pub fn summary_sentence(p: &Prediction) -> String {
 /// A warning where recordings that made the model are predicted with it.
 #[must_use]
 pub fn training_sentence(p: &Prediction) -> Option<String> {
-    let made: Vec<&str> = p.recordings.iter().filter(|r| r.made_the_law).map(|r| r.name.as_str()).collect();
+    let made: Vec<&str> =
+        p.recordings.iter().filter(|r| r.is_training_recording).map(|r| r.name.as_str()).collect();
     (!made.is_empty()).then(|| {
         format!(
             "The model was fitted to {}, so the error there says nothing about new recordings.",
@@ -280,14 +281,14 @@ mod tests {
     use stylet_diagnose::prediction::{Prediction, PredictionResult, RecordingPrediction};
     use stylet_scenario::Scenario;
 
-    fn recording(name: &str, made_the_law: bool) -> RecordingPrediction {
+    fn recording(name: &str, is_training_recording: bool) -> RecordingPrediction {
         RecordingPrediction {
             name: name.to_owned(),
             rmse_n: 0.02,
             assumed_rmse_n: None,
             band_coverage: 0.9,
             peak_error_n: 0.0,
-            made_the_law,
+            is_training_recording,
             zero_offset_n: None,
             surface_shift_m: None,
             force_factor: None,

@@ -51,7 +51,7 @@ pub fn summary_sentence(t: &Transfer) -> String {
     let different = named(true, &|p| difference(p.parameter, p.value, p.low, p.high));
     let equal = named(false, &|p| name(p.parameter).to_owned());
     match t.verdict {
-        TransferVerdict::AnotherLaw => format!(
+        TransferVerdict::AnotherModel => format!(
             "Another law: with all parameters of every recording updated the model is off by {} N rms, {} times its error on its own \
              recordings.",
             significant(t.own_n, 3),
@@ -79,7 +79,8 @@ pub fn summary_sentence(t: &Transfer) -> String {
 pub fn warnings(t: &Transfer) -> Vec<String> {
     let mut out = Vec::new();
     out.extend(zero_offset_sentences(t.recordings.iter().map(|r| (r.name.as_str(), r.zero_offset_n))));
-    let made: Vec<&str> = t.recordings.iter().filter(|r| r.made_the_law).map(|r| r.name.as_str()).collect();
+    let made: Vec<&str> =
+        t.recordings.iter().filter(|r| r.is_training_recording).map(|r| r.name.as_str()).collect();
     if !made.is_empty() {
         out.push(format!("The model was fitted to {}, which hides differences.", made.join(", ")));
     }

@@ -1,10 +1,11 @@
 use super::super::group_deviation::Factor;
 use super::super::group_update::GroupEstimate;
-use super::super::insertion_course::{BINS, Curve, InsertionCourse};
+use super::super::insertion_course::{BINS, InsertionCourse};
 use super::super::prepared::Prepared;
+use super::super::target::Target;
 use super::super::training_curves::TrainingSummary;
 use super::super::uncertainty::{Uncertainty, free_run_force};
-use super::{Band, NOISE_VALUES, SEED, noise_values};
+use super::{NOISE_VALUES, SEED, noise_values};
 use crate::diagnosis_json::{Cause, Diagnosis, Estimate, LabelledParameter, ParameterLabel, RandomEffectSd};
 use rand::SeedableRng;
 use rand::rngs::ChaCha8Rng;
@@ -217,17 +218,11 @@ fn band_edges_are_quantiles_of_draws_noise_and_misfit() {
         courses: vec![course],
         model: m.clone(),
         uncertainty: k.clone(),
-    };
-    let mean_residual: Curve = vec![Some(0.0); BINS];
-    let band = Band {
-        prepared: &prepared,
         training: Some(&training),
-        recording: 0,
-        mean_residual: &mean_residual,
-        places: &places,
     };
+    let target = Target { places, mean_residual: vec![Some(0.0); BINS], ..Target::default() };
     let same = GroupEstimate::new(&[], [0.0; 4], [0.0; 4]);
-    let (low, high) = band.edges(&same, [0.0; 4], false, 0.0);
+    let (low, high) = prepared.band(&target, &same, [0.0; 4], false, 0.0);
     let mut rng = ChaCha8Rng::seed_from_u64(SEED);
     let draws: Vec<Vec<f64>> = (0..80)
         .filter_map(|_| {
@@ -245,8 +240,13 @@ fn band_edges_are_quantiles_of_draws_noise_and_misfit() {
         assert!((low[at] - stylet_stats::quantile_of_sorted(&all, 0.05)).abs() < 1e-12);
         assert!((high[at] - stylet_stats::quantile_of_sorted(&all, 0.95)).abs() < 1e-12);
     }
-    let (wide_low, wide_high) =
-        band.edges(&GroupEstimate::new(&[], [1e-3, 0.3, 0.3, 0.3], [0.0; 4]), [0.0; 4], true, 0.0);
+    let (wide_low, wide_high) = prepared.band(
+        &target,
+        &GroupEstimate::new(&[], [1e-3, 0.3, 0.3, 0.3], [0.0; 4]),
+        [0.0; 4],
+        true,
+        0.0,
+    );
     let width = |low: &[f64], high: &[f64]| low.iter().zip(high).map(|(l, h)| h - l).sum::<f64>();
     assert!(width(&wide_low, &wide_high) > 1.5 * width(&low, &high));
 }

@@ -1,12 +1,13 @@
 //! Converts the analysis of many indented specimens to a diagnosis.
 
-use super::{SpecimenReport, relaxation};
+use super::SpecimenReport;
 use crate::claims::{self, Context};
 use crate::diagnosis_json::{
     Cause, DataQualityNote, Diagnosis, Estimate, Gain, NoiseReport, ResidualStructureReport, Verdict,
 };
 use crate::repeated_insertions::segmented_recording::SegmentedRecording;
-use stylet_tissue::{AnyEffect, Effect, PowerLawFriction, RateDependentPuncture, ShaftSlip};
+use stylet_record::QualityNote;
+use stylet_tissue::{PowerLawFriction, RateDependentPuncture, ShaftSlip, StressRelaxation};
 
 impl SpecimenReport {
     /// Effects of the kept candidates, without repetition.
@@ -26,16 +27,14 @@ impl SpecimenReport {
         let of = |effect: &str| {
             self.parameters
                 .iter()
-                .filter(|n| (effect == relaxation(&[]).info().id) == n.name.starts_with("terms."))
+                .filter(|n| (effect == StressRelaxation::ID) == n.name.starts_with("terms."))
                 .map(|n| (n.name.clone(), Estimate { value: n.mean, low: n.low, high: n.high }))
                 .collect()
         };
         let causes: Vec<Cause> = self
             .kept_effects()
             .map(|effect| Cause {
-                share: 0.0,
                 effect: effect.to_owned(),
-                equivalent: Vec::new(),
                 confidence: self
                     .candidates
                     .iter()
@@ -43,68 +42,44 @@ impl SpecimenReport {
                     .map(|r| r.improved_share)
                     .fold(0.0, f64::max),
                 parameters: of(effect),
-                gain_nats: 0.0,
                 ..Cause::default()
             })
             .collect();
-        let last = self.candidates.iter().rfind(|r| r.kept).map_or(0.0, |r| r.held_out_n);
         let noise = stylet_stats::median_of(recordings.iter().map(SegmentedRecording::noise_n));
+        let note = |(r, note): (&SegmentedRecording, &QualityNote)| DataQualityNote {
+            recording: r.name.clone(),
+            note: note.clone(),
+        };
         let mut diagnosis = Diagnosis {
-            agrees: false,
-            grade: None,
-            findings: Vec::new(),
-        check: Vec::new(),
-        by_recording: Vec::new(),
-        visible_effects: Vec::new(),
-            partial: None,
-            formulas: None,
-            negligible: Vec::new(),
             verdict: if causes.is_empty() { Verdict::None } else { Verdict::Named },
             causes,
-            base_parameters: Vec::new(),
-            parameters: Vec::new(),
-            covariance: Vec::new(),
-            training: None,
-            not_identifiable: unidentifiable_effects(),
+            // Effects that need a retraction or a puncture.
+            not_identifiable: [PowerLawFriction::ID, ShaftSlip::ID, RateDependentPuncture::ID]
+                .map(str::to_owned)
+                .to_vec(),
             gain: Gain {
                 held_out: true,
                 recordings: recordings.iter().map(|r| r.name.clone()).collect(),
                 rmse_before_n: self.candidates.first().map_or(0.0, |r| r.held_out_n),
-                rmse_after_n: last,
-rmse_given_scatter_n: 0.0,
+                rmse_after_n: self.candidates.iter().rfind(|r| r.kept).map_or(0.0, |r| r.held_out_n),
                 floor_n: noise,
-                per_recording_n: Vec::new(),
+                ..Gain::default()
             },
-            residual_structure: ResidualStructureReport {
-                p_value: 1.0,
-                depends_on: Vec::new(),
-                nats: 0.0,
-                share: 0.0,
-            },
+            residual_structure: ResidualStructureReport { p_value: 1.0, ..Default::default() },
             data_quality: recordings
                 .iter()
-                .flat_map(|r| {
-                    r.notes.iter().map(|n| DataQualityNote { recording: r.name.clone(), note: n.clone() })
-                })
+                .flat_map(|r| r.notes.iter().map(move |n| (r, n)))
+                .map(note)
                 .collect(),
-            search_steps: Vec::new(),
-            noise: NoiseReport { sd_n: noise, ar: [0.0; 2], from_air: false },
-            random_effect_sd: Default::default(),
+            noise: NoiseReport { sd_n: noise, ..NoiseReport::default() },
             advice: vec![
-                "The recordings contain neither a retraction nor a puncture: friction and puncture are not identifiable.".to_owned(),
+                "The recordings contain neither a retraction nor a puncture: friction and puncture are not \
+                identifiable."
+                    .to_owned(),
             ],
+            ..Diagnosis::default()
         };
         claims::apply(&mut diagnosis, &Context::default());
         diagnosis
     }
-}
-
-/// Effects that need a retraction or a puncture.
-fn unidentifiable_effects() -> Vec<String> {
-    let effects: [AnyEffect; 3] = [
-        PowerLawFriction { exponent: 1.0 }.into(),
-        ShaftSlip::default().into(),
-        RateDependentPuncture { alpha: 0.0 }.into(),
-    ];
-    effects.iter().map(|e| e.info().id.to_owned()).collect()
 }

@@ -94,11 +94,6 @@ struct SpecimenFits {
     straight: Vec<((f64, f64), Model)>,
 }
 
-/// Effect id of the nonlinear spring.
-fn curvature() -> &'static str {
-    NonlinearElasticity { kappa_per_m: 0.0 }.info().id
-}
-
 /// Relaxation with terms of (fraction, time constant in s).
 fn relaxation(terms: &[(f64, f64)]) -> AnyEffect {
     let term = |&(fraction, time_constant_s): &(f64, f64)| PronyTerm { fraction, time_constant_s };
@@ -110,13 +105,13 @@ fn candidate_sequence() -> [(&'static str, Vec<AnyEffect>); 4] {
     [
         ("base law", Vec::new()),
         (
-            curvature(),
+            NonlinearElasticity::ID,
             vec![
                 NonlinearElasticity { kappa_per_m: 20.0 }.into(),
                 NonlinearElasticity { kappa_per_m: 200.0 }.into(),
             ],
         ),
-        (relaxation(&[]).info().id, vec![relaxation(&[(0.3, 0.7)]), relaxation(&[(0.3, 4.0)])]),
+        (StressRelaxation::ID, vec![relaxation(&[(0.3, 0.7)]), relaxation(&[(0.3, 4.0)])]),
         (
             "stress_relaxation (second term)",
             vec![
@@ -185,7 +180,8 @@ fn total_error(errors: (f64, f64)) -> f64 {
 /// Whether the nonlinear spring is kept in the selected model. The ramp of a relaxing linear spring is curved, so the test is repeated with
 /// the relaxation in the model.
 fn retest_curvature(each: &[SpecimenFits], candidates: &mut [CandidateModel], selected: usize) -> bool {
-    let Some(at) = candidates.iter().position(|r| r.effect.as_deref() == Some(curvature())) else {
+    let Some(at) = candidates.iter().position(|r| r.effect.as_deref() == Some(NonlinearElasticity::ID))
+    else {
         return false;
     };
     if selected > at {
@@ -238,7 +234,7 @@ fn fit_specimen(assumed: &Tissue, run: &SegmentedRecording) -> Option<SpecimenFi
         let b = all.recordings.first()?;
         let (mut before, mut after) = (Vec::new(), Vec::new());
         for (k, e) in left.residual_n.first()?.iter().enumerate().filter(|(k, _)| b.used[*k]) {
-            if 0.5 * (b.start_s[k] + b.end_s[k]) > end { after.push(*e) } else { before.push(*e) }
+            if b.mid_s(k) > end { after.push(*e) } else { before.push(*e) }
         }
         Some((rms(&before), rms(&after)))
     };
@@ -246,7 +242,7 @@ fn fit_specimen(assumed: &Tissue, run: &SegmentedRecording) -> Option<SpecimenFi
     for (_, effects) in candidate_sequence() {
         let starts = if effects.is_empty() { vec![model.clone()] } else { Vec::new() };
         let with = |effect: &AnyEffect| {
-            let term = EffectTerm::new(effect.info(), &effect.parameters());
+            let term = EffectTerm::of(effect);
             // The candidate replaces a term of the same effect.
             let one = model.effects.iter().position(|c| c.info.id == term.info.id);
             one.map_or_else(|| model.clone(), |k| model.without_effect(k)).with_effect(term)
@@ -258,7 +254,7 @@ fn fit_specimen(assumed: &Tissue, run: &SegmentedRecording) -> Option<SpecimenFi
             .min_by(|a, b| a.nats().total_cmp(&b.nats()))?;
         out.errors.push(errors(&fitted.model)?);
         model = fitted.model;
-        let bent = model.effects.iter().position(|c| c.info.id == curvature());
+        let bent = model.effects.iter().position(|c| c.info.id == NonlinearElasticity::ID);
         let straight = bent.map_or_else(
             || Some(model.clone()),
             |k| Some(fit(&model.without_effect(k), &first, FIT_EFFORT)?.model),

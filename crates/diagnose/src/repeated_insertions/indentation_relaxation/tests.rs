@@ -1,6 +1,6 @@
 use super::{
     CandidateModel, FITTED_HOLD_SHARE, MIN_RELATIVE_GAIN, SpecimenFits, SpecimenReport, SpecimenStatistic,
-    analyze_specimens, curvature, parameter_statistics, retest_curvature,
+    analyze_specimens, parameter_statistics, retest_curvature,
 };
 use super::{check_ramp_and_hold, fit_specimen, parameter_value, relaxation};
 use crate::diagnosis_json::Verdict;
@@ -263,8 +263,11 @@ fn rung(effect: &str, better: f64, kept: bool) -> CandidateModel {
 #[test]
 fn the_nonlinear_spring_stays_if_most_specimens_need_it() {
     let result = |all: &[[(f64, f64); 2]], standing: usize| {
-        let mut rungs =
-            [rung("", 0.0, true), rung(curvature(), 1.0, true), rung("stress_relaxation", 1.0, true)];
+        let mut rungs = [
+            rung("", 0.0, true),
+            rung(NonlinearElasticity::ID, 1.0, true),
+            rung("stress_relaxation", 1.0, true),
+        ];
         let kept = retest_curvature(&judged(all), &mut rungs, standing);
         assert_eq!(rungs[1].kept, kept);
         (kept, (rungs[standing].fitted_n, rungs[standing].held_out_n))
@@ -285,7 +288,7 @@ fn the_nonlinear_spring_stays_if_most_specimens_need_it() {
 fn the_confidence_of_a_cause_is_that_of_its_best_kept_candidate() {
     let rungs = vec![
         rung("", 0.0, true),
-        rung(curvature(), 0.8, true),
+        rung(NonlinearElasticity::ID, 0.8, true),
         rung("stress_relaxation", 0.9, true),
         rung("stress_relaxation", 1.0, false),
     ];

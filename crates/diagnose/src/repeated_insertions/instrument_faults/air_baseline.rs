@@ -29,7 +29,6 @@ pub struct LinearTrend {
 }
 
 /// Least-squares line through forces `f` (N) at times `t` (s).
-#[must_use]
 pub fn fit_trend(t: &[f64], f: &[f64]) -> LinearTrend {
     let (middle, level) = (mean(t), mean(f));
     let about = |x: &[f64], mean: f64| x.iter().map(|x| x - mean).collect::<Vec<_>>();
@@ -66,7 +65,6 @@ pub struct AirAnalysis {
 
 impl AirAnalysis {
     /// Analyses a recording in air.
-    #[must_use]
     pub fn new(air: &Recording) -> Self {
         let (t, f) = (&air.time_s, &air.force_n);
         let moves_in = |sign: f64| {
@@ -118,7 +116,6 @@ fn samples_before_contact(r: &Recording, surface_m: f64) -> Option<std::ops::Ran
 }
 
 /// Lines through the force before contact, of the recordings in which it is straight; a force of tissue is not.
-#[must_use]
 pub fn pre_contact_trends(recordings: &[&SegmentedRecording], surface_m: f64) -> Vec<LinearTrend> {
     recordings
         .iter()
@@ -127,7 +124,6 @@ pub fn pre_contact_trends(recordings: &[&SegmentedRecording], surface_m: f64) ->
 }
 
 /// Drift (N/s) between the air before and after an insertion; `None` if either force is not straight.
-#[must_use]
 pub fn air_drift_n_per_s(run: &SegmentedRecording, surface_m: f64) -> Option<f64> {
     let r = &run.recording;
     let there = samples_before_contact(r, surface_m)?;
@@ -144,7 +140,6 @@ pub fn air_drift_n_per_s(run: &SegmentedRecording, surface_m: f64) -> Option<f64
 }
 
 /// Median over the recordings; zero if its median absolute deviation exceeds half of it.
-#[must_use]
 pub fn consensus(values: &[f64]) -> f64 {
     let middle = median_of(values.iter().copied());
     let apart = median_of(values.iter().map(|x| (x - middle).abs()));

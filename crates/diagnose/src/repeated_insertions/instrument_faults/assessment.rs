@@ -99,23 +99,15 @@ impl InstrumentReport {
     fn classify(&mut self, force_n: f64, duration_s: f64, has_air_recording: bool, lag: Option<DetectedLag>) {
         let (mut excluded, mut detected) = (Vec::new(), Vec::new());
         let mut classify = |effect_model: AnyEffect, max_force_n: f64, reported: usize, evidence: String| {
-            let effect = effect_model.info().id.to_owned();
             if max_force_n.abs() < NEGLIGIBLE_SHARE * force_n {
+                let effect = effect_model.info().id.to_owned();
                 excluded.push(ExcludedFault { effect, max_force_n: max_force_n.abs(), evidence });
                 return;
             }
             // The interval is omitted: the standard error of a mean is far below the threshold.
             let of = |value: f64| Estimate { value, low: value, high: value };
-            let values = effect_model.parameters();
-            let named = effect_model.info().parameters.iter().zip(values).take(reported);
-            let parameters = named.map(|(p, x)| (p.path.to_owned(), of(x))).collect();
-            detected.push(DetectedFault {
-                effect,
-                parameters,
-                max_force_n: max_force_n.abs(),
-                evidence,
-                effect_model: Some(effect_model),
-            });
+            let values = effect_model.parameters().into_iter().map(of).take(reported);
+            detected.push(DetectedFault::new(effect_model, values, max_force_n.abs(), evidence));
         };
         let mn = |x: f64| format!("{:.1} mN", 1e3 * x);
         if let Some(eps) = self.gain {
@@ -149,21 +141,11 @@ impl InstrumentReport {
                 }
             };
             let estimate = Estimate { value: lag.value_s, low: lag.low_s, high: lag.high_s };
-            detected.push(DetectedFault {
-                effect: effect_model.info().id.to_owned(),
-                parameters: effect_model
-                    .info()
-                    .parameters
-                    .iter()
-                    .map(|p| (p.path.to_owned(), estimate))
-                    .collect(),
-                max_force_n: force_n,
-                evidence: format!(
-                    "the force at stops and reversals of the needle has {how} {:.2} s ({:.2} to {:.2} s)",
-                    lag.value_s, lag.low_s, lag.high_s
-                ),
-                effect_model: Some(effect_model),
-            });
+            let evidence = format!(
+                "the force at stops and reversals of the needle has {how} {:.2} s ({:.2} to {:.2} s)",
+                lag.value_s, lag.low_s, lag.high_s
+            );
+            detected.push(DetectedFault::new(effect_model, [estimate], force_n, evidence));
         }
         (self.excluded, self.detected) = (excluded, detected);
     }

@@ -3,7 +3,7 @@
 use crate::diagnosis_json::{Cause, Estimate};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use stylet_tissue::AnyEffect;
+use stylet_tissue::{AnyEffect, Effect};
 
 /// Confidence in a fault that was measured directly, without a tissue model.
 const DETECTION_CONFIDENCE: f64 = 0.99;
@@ -58,9 +58,21 @@ pub struct DetectedFault {
 }
 
 impl DetectedFault {
+    /// A fault with estimates of its first parameters.
+    pub(super) fn new(
+        effect_model: AnyEffect,
+        estimates: impl IntoIterator<Item = Estimate>,
+        max_force_n: f64,
+        evidence: String,
+    ) -> Self {
+        let info = effect_model.info();
+        let paths = info.parameters.iter().map(|p| p.path.to_owned());
+        let (effect, parameters) = (info.id.to_owned(), paths.zip(estimates).collect());
+        Self { effect, parameters, max_force_n, evidence, effect_model: Some(effect_model) }
+    }
+
     /// Whether the recordings are corrected for it; block means remove tones, and drive friction stays.
-    #[must_use]
-    pub fn is_corrected(&self) -> bool {
+    pub(crate) fn is_corrected(&self) -> bool {
         let stays =
             |e: &AnyEffect| matches!(e, AnyEffect::PeriodicInterference(_) | AnyEffect::DriveFriction(_));
         self.effect_model.as_ref().is_some_and(|e| !stays(e))
@@ -71,11 +83,8 @@ impl DetectedFault {
     pub fn cause(&self) -> Cause {
         Cause {
             effect: self.effect.clone(),
-            equivalent: Vec::new(),
             confidence: DETECTION_CONFIDENCE,
             parameters: self.parameters.clone(),
-            gain_nats: 0.0,
-            share: 0.0,
             ..Cause::default()
         }
     }

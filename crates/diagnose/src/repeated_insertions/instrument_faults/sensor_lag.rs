@@ -55,7 +55,6 @@ pub struct DetectedLag {
 }
 
 /// Detects a delay or lag common to the recordings; `None` if it does not improve the fit enough.
-#[must_use]
 pub fn detect_lag(recordings: &[&SegmentedRecording]) -> Option<DetectedLag> {
     let corners =
         |at: CornerKind| -> Vec<Corner> { recordings.iter().filter_map(|r| Corner::of(r, at)).collect() };

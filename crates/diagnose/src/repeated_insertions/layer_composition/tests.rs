@@ -1,6 +1,6 @@
+use super::super::start_values::SLIP_RATE_INDEX;
 use super::{
-    ModelFamily, SLIP_RATE_INDEX, compose_layers, identified_effects, stack_models, surface_shift_m,
-    with_moved_surface,
+    ModelFamily, compose_layers, identified_effects, stack_models, surface_shift_m, with_moved_surface,
 };
 use crate::repeated_insertions::SegmentedRecording;
 use crate::test_fixtures::{self, gel_tissue, simulated_recordings};

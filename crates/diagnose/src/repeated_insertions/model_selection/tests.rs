@@ -1,4 +1,4 @@
-use super::{MIN_IMPROVEMENT, best_candidate, quantisation_noise_n, search_subset};
+use super::{MIN_IMPROVEMENT, best_candidate, search_subset};
 use crate::base_law_fit::PreparedRecordings;
 use crate::repeated_insertions::ablation::tests::{friction, stick_slip};
 use crate::repeated_insertions::multistart_fit::set_blocks;
@@ -51,13 +51,6 @@ fn the_best_candidate_must_improve_by_its_margin() {
     let base = test_fixtures::unmeasured_candidate(ModelFamily::Base, &[], &[2.0, 2.0], 0.0);
     assert_eq!(best_candidate(&base, Some(&slip(1.9)), None).family, ModelFamily::ShaftSlip);
     assert_eq!(kind(Some(slip(f64::INFINITY)), Some(many(0.97))), ModelFamily::Library);
-}
-
-#[test]
-fn quantisation_noise_is_uniform_over_one_step() {
-    let noise_n = quantisation_noise_n(&SensorArtefacts { step_n: Some(0.6), ..SensorArtefacts::default() });
-    assert!((noise_n / (0.6 / 12.0_f64.sqrt()) - 1.0).abs() < 2e-3, "{noise_n}");
-    assert_eq!(quantisation_noise_n(&SensorArtefacts::default()), 0.0);
 }
 
 #[test]

@@ -1,6 +1,7 @@
+use super::super::start_values::SLIP_RATE_INDEX;
 use super::{
-    AGREEMENT, MAX_RMS_RATIO, SAME_OPTIMUM, SET_BLOCK_S, SLIP_RATE_INDEX, StartValues, distinct_optima,
-    fit_from, fit_with_noise_updates, move_day_trend_to_rate, set_blocks, start_values, update_scatter,
+    AGREEMENT, MAX_RMS_RATIO, SAME_OPTIMUM, SET_BLOCK_S, StartValues, distinct_optima, fit_from,
+    fit_with_noise_updates, move_day_trend_to_rate, set_blocks, start_values, update_scatter,
     with_initial_noise,
 };
 use crate::repeated_insertions::SegmentedRecording;
@@ -136,14 +137,14 @@ fn the_scatter_is_estimated_by_expectation_maximisation() {
                 [own.surface_m, own.ln_friction] = x;
             }
         });
-        let tangent = Linearization::new(&at.model, &data, &at.residuals);
+        let linearization = Linearization::new(&at.model, &data, &at.residuals);
         let (mut surface, mut friction) = (0.0, 0.0);
         for r in 0..3 {
-            let (i, j) = (tangent.index_of(0, r), tangent.index_of(1, r));
+            let (i, j) = (linearization.index_of(0, r), linearization.index_of(1, r));
             let (a, b, c) = (
-                tangent.normal_matrix.at(i, i),
-                tangent.normal_matrix.at(j, i),
-                tangent.normal_matrix.at(j, j),
+                linearization.normal_matrix.at(i, i),
+                linearization.normal_matrix.at(j, i),
+                linearization.normal_matrix.at(j, j),
             );
             let own = at.model.per_recording[r];
             surface += own.surface_m.powi(2) + c / (a * c - b * b);
@@ -187,10 +188,10 @@ fn the_scatter_between_days_includes_its_prior() {
             DayParameters { surface_m: -3e-4, ln_friction: 0.09 },
         ];
     });
-    let tangent = Linearization::new(&at.model, &data, &at.residuals);
+    let linearization = Linearization::new(&at.model, &data, &at.residuals);
     let (mut surface, mut friction) = (4.0 * 3e-4 * 3e-4, 4.0 * 0.03 * 0.03);
-    for (i, n) in tangent.shared.iter().enumerate() {
-        let open = 1.0 / tangent.normal_matrix.at(i, i);
+    for (i, n) in linearization.shared.iter().enumerate() {
+        let open = 1.0 / linearization.normal_matrix.at(i, i);
         match n.role {
             ParameterRole::DaySurface(d) => surface += at.model.days[d].surface_m.powi(2) + open,
             ParameterRole::DayFriction(d) => friction += at.model.days[d].ln_friction.powi(2) + open,

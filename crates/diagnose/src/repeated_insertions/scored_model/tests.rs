@@ -1,4 +1,4 @@
-use super::{DRAWS, REFIT_TURNS, active_effects, cross_validate, rms_errors_n, with_coarse_blocks};
+use super::{DRAWS, REFIT_ITERATIONS, active_effects, cross_validate, rms_errors_n, with_coarse_blocks};
 use crate::repeated_insertions::ablation::tests::{delayed, model, stick_slip};
 use crate::repeated_insertions::cross_validation::{population_without, score_prediction};
 use crate::repeated_insertions::multistart_fit::{SET_BLOCK_S, SetFit};
@@ -47,8 +47,9 @@ fn cross_validation_scores_held_out_recordings() {
         let fitted = fit_from_truth(&[], &recordings);
         let result = cross_validate(&fitted, &recordings);
         assert_eq!(result.len(), count);
-        let others = population_without(&with_coarse_blocks(&fitted), &recordings, &fold, &[REFIT_TURNS])
-            .expect("a fit");
+        let others =
+            population_without(&with_coarse_blocks(&fitted), &recordings, &fold, &[REFIT_ITERATIONS])
+                .expect("a fit");
         for r in fold {
             let wanted = score_prediction(recordings[r], &predict_force(&others, recordings[r], None, DRAWS));
             assert_eq!(result[r], Some(wanted), "{r} of {count}");

@@ -26,6 +26,14 @@ pub struct SensorArtefacts {
     pub spikes: Option<Spikes>,
 }
 
+impl SensorArtefacts {
+    /// Standard deviation (N) of the rounding of the recorded force.
+    #[must_use]
+    pub fn quantisation_sd_n(&self) -> f64 {
+        self.step_n.unwrap_or(0.0) * stylet_stats::UNIFORM_SD
+    }
+}
+
 /// Finds range, resolution and spikes of the sensor from the forces of recordings with these quality notes.
 #[must_use]
 pub fn find_sensor_artefacts(recordings: &[&Recording], notes: &[Vec<QualityNote>]) -> SensorArtefacts {
@@ -83,6 +91,13 @@ mod tests {
             lines: Vec::new(),
             blocking: false,
         }
+    }
+
+    #[test]
+    fn quantisation_noise_is_uniform_over_one_step() {
+        let noise_n = SensorArtefacts { step_n: Some(0.6), ..SensorArtefacts::default() }.quantisation_sd_n();
+        assert!((noise_n / (0.6 / 12.0_f64.sqrt()) - 1.0).abs() < 2e-3, "{noise_n}");
+        assert_eq!(SensorArtefacts::default().quantisation_sd_n(), 0.0);
     }
 
     /// Samples that alternate by `d` about zero differ from their neighbours by `d`: the scatter is 1.4826 `d`.
