@@ -255,7 +255,7 @@ fn every_number_on_the_page_has_its_source_class() {
         19,
         "every figure is compared with the supplement"
     );
-    assert!(html.contains("Numbers of ours, and the verdicts that hang on them"));
+    assert!(html.contains("Assumed values, and the verdicts that depend on them"));
 }
 
 #[test]

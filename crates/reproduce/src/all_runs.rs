@@ -52,9 +52,9 @@ pub struct RecordingKey {
 
 /// Key of a run: recording, sensor, and variant of the algorithm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Key {
+pub struct RunKey {
     /// The recording.
-    pub recorded: RecordingKey,
+    pub recording_key: RecordingKey,
     /// Sensor.
     pub sensor: Sensor,
     /// Model and protocol.
@@ -64,7 +64,7 @@ pub struct Key {
 /// Lookups of a planning study, with their number of seeds.
 #[derive(Clone, Debug, Default)]
 struct RequestedRuns {
-    runs: BTreeMap<Key, u64>,
+    runs: BTreeMap<RunKey, u64>,
     offline: BTreeMap<RecordingKey, u64>,
 }
 
@@ -75,7 +75,7 @@ pub struct Study {
     pub first_seed: u64,
     /// Number of noise seeds.
     pub seeds: u64,
-    runs: BTreeMap<Key, Vec<Outcome>>,
+    runs: BTreeMap<RunKey, Vec<Outcome>>,
     offline: BTreeMap<RecordingKey, Vec<Offline>>,
     tunings: BTreeMap<(RecordingKey, Sensor), Tuning>,
     requested: Option<Mutex<RequestedRuns>>,
@@ -86,17 +86,17 @@ type Group = (Case, Option<Change>);
 
 /// One recording of one seed, with all requested runs.
 struct Job<'a> {
-    recorded: RecordingKey,
+    recording_key: RecordingKey,
     insertion: &'a Insertion,
     seed: u64,
-    runs: Vec<Key>,
+    runs: Vec<RunKey>,
     offline: bool,
 }
 
 /// Result of a job.
 #[derive(Default)]
 struct JobResult {
-    runs: Vec<(Key, Outcome)>,
+    runs: Vec<(RunKey, Outcome)>,
     offline: Option<(RecordingKey, Offline)>,
 }
 
@@ -113,7 +113,7 @@ impl Plan {
     fn recordings(&self) -> Vec<(RecordingKey, u64)> {
         let mut all: BTreeMap<RecordingKey, u64> = self.requested.offline.clone();
         for (key, seeds) in &self.requested.runs {
-            let most = all.entry(key.recorded).or_default();
+            let most = all.entry(key.recording_key).or_default();
             *most = (*most).max(*seeds);
         }
         let mut list: Vec<(RecordingKey, u64)> = all.into_iter().collect();
@@ -152,7 +152,7 @@ impl Plan {
     fn required_tunings(&self) -> BTreeMap<RecordingKey, BTreeMap<Sensor, bool>> {
         let mut all: BTreeMap<RecordingKey, BTreeMap<Sensor, bool>> = BTreeMap::new();
         for key in self.requested.runs.keys().filter(|k| k.variant.is_tuned()) {
-            let sensors = all.entry(unchanged_on_arm(key.recorded)).or_default();
+            let sensors = all.entry(unchanged_on_arm(key.recording_key)).or_default();
             *sensors.entry(key.sensor).or_default() |= key.variant.ablation == Ablation::Trace;
         }
         all
@@ -160,8 +160,8 @@ impl Plan {
 }
 
 /// On the arm a changed phantom is run with the tuning of the unchanged one.
-fn unchanged_on_arm(recorded: RecordingKey) -> RecordingKey {
-    if recorded.case.on_arm() { RecordingKey { change: None, ..recorded } } else { recorded }
+fn unchanged_on_arm(recording_key: RecordingKey) -> RecordingKey {
+    if recording_key.case.on_arm() { RecordingKey { change: None, ..recording_key } } else { recording_key }
 }
 
 impl Study {
@@ -195,25 +195,27 @@ impl Study {
         let tunings: Vec<Vec<Tuned>> = plan
             .required_tunings()
             .into_par_iter()
-            .map(|(recorded, sensors)| {
-                let insertion = insertions.get(&(recorded.case, recorded.change));
-                tune(recorded, insertion.ok_or_else(|| missing(&recorded))?, &sensors)
+            .map(|(recording_key, sensors)| {
+                let insertion = insertions.get(&(recording_key.case, recording_key.change));
+                tune(recording_key, insertion.ok_or_else(|| missing(&recording_key))?, &sensors)
             })
             .collect::<Result<_, _>>()?;
         let tunings: BTreeMap<(RecordingKey, Sensor), Tuning> = tunings.into_iter().flatten().collect();
         let mut jobs = Vec::new();
-        for (recorded, seeds) in plan.recordings() {
-            let insertion =
-                insertions.get(&(recorded.case, recorded.change)).ok_or_else(|| missing(&recorded))?;
+        for (recording_key, seeds) in plan.recordings() {
+            let insertion = insertions
+                .get(&(recording_key.case, recording_key.change))
+                .ok_or_else(|| missing(&recording_key))?;
             for index in 0..seeds {
                 let wants = |most: &u64| *most > index;
-                let runs = plan.requested.runs.iter().filter(|(k, n)| k.recorded == recorded && wants(n));
+                let runs =
+                    plan.requested.runs.iter().filter(|(k, n)| k.recording_key == recording_key && wants(n));
                 jobs.push(Job {
-                    recorded,
+                    recording_key,
                     insertion,
                     seed: plan.first_seed + index,
                     runs: runs.map(|(k, _)| *k).collect(),
-                    offline: plan.requested.offline.get(&recorded).is_some_and(wants),
+                    offline: plan.requested.offline.get(&recording_key).is_some_and(wants),
                 });
             }
         }
@@ -226,14 +228,14 @@ impl Study {
                 found
             })
             .collect::<Result<_, _>>()?;
-        let mut runs: BTreeMap<Key, Vec<Outcome>> = BTreeMap::new();
+        let mut runs: BTreeMap<RunKey, Vec<Outcome>> = BTreeMap::new();
         let mut offline: BTreeMap<RecordingKey, Vec<Offline>> = BTreeMap::new();
         for done in outcomes {
             for (key, outcome) in done.runs {
                 runs.entry(key).or_default().push(outcome);
             }
-            if let Some((recorded, found)) = done.offline {
-                offline.entry(recorded).or_default().push(found);
+            if let Some((recording_key, found)) = done.offline {
+                offline.entry(recording_key).or_default().push(found);
             }
         }
         Ok(Self { first_seed: first, seeds: plan.seeds, runs, offline, tunings, requested: None })
@@ -241,7 +243,7 @@ impl Study {
 
     /// The outcomes of one combination, by seed, at most `seeds` of them; recorded in a planning study.
     #[must_use]
-    pub fn runs(&self, key: Key, seeds: u64) -> &[Outcome] {
+    pub fn runs(&self, key: RunKey, seeds: u64) -> &[Outcome] {
         let seeds = seeds.min(self.seeds);
         if let Some(mut requested) = self.requested.as_ref().and_then(|w| w.lock().ok()) {
             let most = requested.runs.entry(key).or_default();
@@ -253,20 +255,20 @@ impl Study {
 
     /// The offline estimates of a recording, as [`Study::runs`].
     #[must_use]
-    pub fn offline(&self, recorded: RecordingKey, seeds: u64) -> &[Offline] {
+    pub fn offline(&self, recording_key: RecordingKey, seeds: u64) -> &[Offline] {
         let seeds = seeds.min(self.seeds);
         if let Some(mut requested) = self.requested.as_ref().and_then(|w| w.lock().ok()) {
-            let most = requested.offline.entry(recorded).or_default();
+            let most = requested.offline.entry(recording_key).or_default();
             *most = (*most).max(seeds);
         }
-        let all = self.offline.get(&recorded).map_or(&[][..], Vec::as_slice);
+        let all = self.offline.get(&recording_key).map_or(&[][..], Vec::as_slice);
         &all[..all.len().min(seeds as usize)]
     }
 
     /// The tuned thresholds of a phantom; the published defaults if it was not tuned.
     #[must_use]
-    pub fn tuning(&self, recorded: RecordingKey, sensor: Sensor) -> Tuning {
-        self.tunings.get(&(unchanged_on_arm(recorded), sensor)).copied().unwrap_or_default()
+    pub fn tuning(&self, recording_key: RecordingKey, sensor: Sensor) -> Tuning {
+        self.tunings.get(&(unchanged_on_arm(recording_key), sensor)).copied().unwrap_or_default()
     }
 
     /// All tunings.
@@ -280,11 +282,11 @@ type Tuned = ((RecordingKey, Sensor), Tuning);
 
 /// The tunings of a recording; on the arm one simulation of each tuning seed serves every sensor.
 fn tune(
-    recorded: RecordingKey,
+    recording_key: RecordingKey,
     insertion: &Insertion,
     sensors: &BTreeMap<Sensor, bool>,
 ) -> Result<Vec<Tuned>, ReproduceError> {
-    let on_arm = recorded.case.on_arm();
+    let on_arm = recording_key.case.on_arm();
     let seeds: Vec<u64> = (0..if on_arm { TUNING_SEEDS_ARM } else { TUNING_SEEDS })
         .map(|index| TUNING_FIRST_SEED + index)
         .collect();
@@ -296,10 +298,10 @@ fn tune(
     let of = |sensor: Sensor, trace: bool| {
         let recording = |(index, seed): (usize, &u64)| {
             let insertion = made.get(index).unwrap_or(insertion);
-            (insertion, samples_of(insertion, *seed, recorded.noise_mn, sensor))
+            (insertion, samples_of(insertion, *seed, recording_key.noise_mn, sensor))
         };
         let recordings: Vec<_> = seeds.iter().enumerate().map(recording).collect();
-        ((recorded, sensor), Tuning::of(&recordings, sensor, trace))
+        ((recording_key, sensor), Tuning::of(&recordings, sensor, trace))
     };
     Ok(sensors.iter().map(|(sensor, trace)| of(*sensor, *trace)).collect())
 }
@@ -319,7 +321,7 @@ fn run_job(
     let mut done = JobResult::default();
     // On the arm the torque noise moves the needle, so each seed is a separate insertion.
     let fresh;
-    let insertion = if job.recorded.case.on_arm() && job.seed != first_seed {
+    let insertion = if job.recording_key.case.on_arm() && job.seed != first_seed {
         fresh = Insertion::of(&job.insertion.scenario, job.seed)?;
         &fresh
     } else {
@@ -330,8 +332,8 @@ fn run_job(
         if !(job.offline && sensor == Sensor::ForceTorque) && runs_of_sensor.clone().next().is_none() {
             continue;
         }
-        let samples = samples_of(insertion, job.seed, job.recorded.noise_mn, sensor);
-        let tuning = tunings.get(&(unchanged_on_arm(job.recorded), sensor)).copied().unwrap_or_default();
+        let samples = samples_of(insertion, job.seed, job.recording_key.noise_mn, sensor);
+        let tuning = tunings.get(&(unchanged_on_arm(job.recording_key), sensor)).copied().unwrap_or_default();
         let mut shares = Vec::new();
         for key in runs_of_sensor {
             let outcome = insertion.run(&samples, sensor, key.variant, &tuning);
@@ -341,7 +343,7 @@ fn run_job(
             done.runs.push((*key, outcome));
         }
         if job.offline && sensor == Sensor::ForceTorque {
-            done.offline = Some((job.recorded, Offline::of(insertion, &samples, &shares)));
+            done.offline = Some((job.recording_key, Offline::of(insertion, &samples, &shares)));
         }
     }
     Ok(done)

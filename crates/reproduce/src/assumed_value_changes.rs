@@ -47,7 +47,7 @@ pub enum AssumedValue {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Change {
     /// The assumed value.
-    pub number: AssumedValue,
+    pub value: AssumedValue,
     /// Doubled instead of halved.
     pub doubled: bool,
 }
@@ -107,7 +107,7 @@ impl AssumedValue {
     /// Halved and doubled.
     #[must_use]
     pub const fn changes(self) -> [Change; 2] {
-        [Change { number: self, doubled: false }, Change { number: self, doubled: true }]
+        [Change { value: self, doubled: false }, Change { value: self, doubled: true }]
     }
 
     /// Whether the value affects a recording. The noise of the force/torque sensor is a separate key, and `s1` belongs to
@@ -148,14 +148,14 @@ impl Change {
     /// `K of the stack halved`.
     #[must_use]
     pub fn words(self) -> String {
-        format!("{} {}", self.number.name(), if self.doubled { "doubled" } else { "halved" })
+        format!("{} {}", self.value.name(), if self.doubled { "doubled" } else { "halved" })
     }
 
     /// Changes a scenario.
     pub fn apply(self, scenario: &mut Scenario) {
         let factor = self.factor();
         for layer in &mut scenario.tissue.layers {
-            match self.number {
+            match self.value {
                 AssumedValue::GelStiffness
                 | AssumedValue::StackStiffness
                 | AssumedValue::LiverStiffness
@@ -182,11 +182,11 @@ impl Change {
         if let (
             AssumedValue::TravelInAir,
             Motion::Constant { start_m, .. } | Motion::Sinusoidal { start_m, .. },
-        ) = (self.number, &mut scenario.motion)
+        ) = (self.value, &mut scenario.motion)
         {
             *start_m *= factor;
         }
-        if let (AssumedValue::TimeBehindTarget, Some(out_s)) = (self.number, out_of_the_target_s(scenario))
+        if let (AssumedValue::TimeBehindTarget, Some(out_s)) = (self.value, out_of_the_target_s(scenario))
             && let Motion::Constant { duration_s, .. } | Motion::Sinusoidal { duration_s, .. } =
                 &mut scenario.motion
         {
@@ -195,7 +195,7 @@ impl Change {
         if let (
             AssumedValue::TorqueNoise,
             Sensor::Both { virtual_sensor, .. } | Sensor::Virtual(virtual_sensor),
-        ) = (self.number, &mut scenario.sensor)
+        ) = (self.value, &mut scenario.sensor)
         {
             virtual_sensor.torque_noise_nm *= factor;
         }
@@ -228,13 +228,13 @@ mod tests {
         for case in Case::ALL {
             let plain = case.scenario().expect("valid");
             for change in AssumedValue::ALL.into_iter().flat_map(AssumedValue::changes) {
-                if !change.number.enters(case) {
+                if !change.value.enters(case) {
                     continue;
                 }
                 let mut changed = plain.clone();
                 change.apply(&mut changed);
                 // The middle gel stays where it is when the contrast changes.
-                if change.number != AssumedValue::GelContrast {
+                if change.value != AssumedValue::GelContrast {
                     assert_ne!(changed, plain, "{case:?} {}", change.words());
                 }
                 let checked = changed.check().map_err(|p| p.message);

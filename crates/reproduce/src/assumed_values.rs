@@ -12,11 +12,11 @@ use crate::value_source::{Class, SourcedTable, inputs};
 use stylet_report::{Cell, Section, Status, Table};
 
 /// Distinct values of an assumed value in the experiments that use it.
-fn values(number: AssumedValue) -> (String, String) {
+fn values(assumed: AssumedValue) -> (String, String) {
     let (mut values, mut classes): (Vec<String>, Vec<&str>) = (Vec::new(), Vec::new());
     for case in Case::ALL {
         let Ok(scenario) = case.scenario() else { continue };
-        for input in inputs(case, &scenario).into_iter().filter(|i| i.number == Some(number)) {
+        for input in inputs(case, &scenario).into_iter().filter(|i| i.assumed_value == Some(assumed)) {
             if !values.contains(&input.value) {
                 values.push(input.value);
             }
@@ -25,16 +25,16 @@ fn values(number: AssumedValue) -> (String, String) {
             }
         }
     }
-    if number == AssumedValue::GelContrast {
+    if assumed == AssumedValue::GelContrast {
         values.push("0.5 and 1.33 between neighbours".to_owned());
         classes.push(Class::Ours.words());
     }
     (values.join("; "), classes.join(", "))
 }
 
-fn row(number: AssumedValue, claims: &[Claim]) -> Vec<Cell> {
-    let (value, class) = values(number);
-    let [halved, doubled] = number.changes();
+fn row(assumed: AssumedValue, claims: &[Claim]) -> Vec<Cell> {
+    let (value, class) = values(assumed);
+    let [halved, doubled] = assumed.changes();
     let claims_decided_by = |change| {
         let ids: Vec<String> = claims
             .iter()
@@ -45,11 +45,11 @@ fn row(number: AssumedValue, claims: &[Claim]) -> Vec<Cell> {
     };
     let tried: Vec<&str> = claims
         .iter()
-        .filter(|c| c.trials.iter().any(|t| t.change.number == number))
+        .filter(|c| c.trials.iter().any(|t| t.change.value == assumed))
         .map(|c| c.id.as_str())
         .collect();
     vec![
-        Cell::text(number.name()),
+        Cell::text(assumed.name()),
         Cell::text(value),
         Cell::text(class),
         claims_decided_by(halved),
@@ -178,7 +178,7 @@ pub fn section(study: &Study, claims: &[Claim]) -> Section {
         ("when a rupture counts as found", "declared within 1 s", shorter_detection_window(study, claims)),
         ("over-compensation that is visible", "5 %", other_visibility_thresholds(study, claims)),
         ("share of the seeds that must give a value", "0.8", other_seed_shares(claims)),
-        ("halving and doubling", "a factor of two", "a guess at how wrong a chosen number can be".to_owned()),
+        ("halving and doubling", "a factor of two", "an assumed bound on the error of a chosen value".to_owned()),
         (
             "noise seeds",
             "50; 12 for halved and doubled numbers, 2 on the arm",
@@ -188,15 +188,15 @@ pub fn section(study: &Study, claims: &[Claim]) -> Section {
     let fixed = fixed.map(|(what, value, why)| {
         vec![Cell::text(what), Cell::text(value), Cell::text(Class::Ours.words()), Cell::text(why)]
     });
-    Section::new("Numbers of ours, and the verdicts that hang on them")
+    Section::new("Assumed values, and the verdicts that depend on them")
         .text(
             "Every number that the paper does not give was halved and doubled, one at a time, and the primary conditions computed again. A claim's letter: its \
-             effect then lies on the other side of the bar, or exists only with or only without the change; such a verdict is `assumed`.",
+             effect then lies on the other side of the limit, or exists only with or only without the change; such a verdict is `assumed`.",
         )
         .table(
             SourcedTable::named(Table {
                 title: "Halved and doubled".to_owned(),
-                headers: ["number", "value", "whose", "halved: hang on it", "doubled: hang on it", "tried on"]
+                headers: ["number", "value", "whose", "halved: verdicts that change", "doubled: verdicts that change", "tried on"]
                     .map(String::from)
                     .to_vec(),
                 rows: numbers,
@@ -206,8 +206,8 @@ pub fn section(study: &Study, claims: &[Claim]) -> Section {
         )
         .table(
             SourcedTable::named(Table {
-                title: "Bars: a verdict changes when its bar is moved across the interval".to_owned(),
-                headers: ["claim (the paper's)", "bar", "whose", "effect (computed)"].map(String::from).to_vec(),
+                title: "Criteria: a verdict changes when its limit is moved across the interval".to_owned(),
+                headers: ["claim (the paper's)", "criterion", "whose", "effect (computed)"].map(String::from).to_vec(),
                 rows: bars,
                 ..Table::default()
             })
@@ -216,7 +216,7 @@ pub fn section(study: &Study, claims: &[Claim]) -> Section {
         .table(
             SourcedTable::named(Table {
                 title: "Chosen, but not halved and doubled".to_owned(),
-                headers: ["what", "value", "whose", "what hangs on it (computed)"].map(String::from).to_vec(),
+                headers: ["what", "value", "whose", "what depends on it (computed)"].map(String::from).to_vec(),
                 rows: fixed.into(),
                 ..Table::default()
             })

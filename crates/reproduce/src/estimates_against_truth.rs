@@ -18,7 +18,7 @@ type Row = (String, Case, u32, Sensor, Setup);
 const fn setup(sensor: Sensor) -> Setup {
     match sensor {
         Sensor::ForceTorque => Setup::Tuned,
-        Sensor::Virtual => Setup::Own,
+        Sensor::Virtual => Setup::ScenarioThresholds,
     }
 }
 
@@ -202,7 +202,7 @@ pub fn section(study: &Study, pictures: &[(&'static str, String)]) -> Section {
     let arm = |case: Case, name: &str| -> Vec<Row> {
         vec![
             (format!("{name} on the arm, force/torque"), case, NOISE_MN, ForceTorque, Setup::Tuned),
-            (format!("{name} on the arm, virtual"), case, NOISE_MN, Virtual, Setup::Own),
+            (format!("{name} on the arm, virtual"), case, NOISE_MN, Virtual, Setup::ScenarioThresholds),
         ]
     };
     let mut liver = noises(Case::Liver, "liver");

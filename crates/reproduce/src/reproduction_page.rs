@@ -35,7 +35,7 @@ fn summary(claims: &[Claim], study: &Study) -> Section {
                 || ("–".to_owned(), "–".to_owned(), Cell::text("–")),
                 |p| (p.effect.words(), p.bar.words(), Cell::text(p.says.words()).status(said(p.says))),
             );
-            let mut hangs: Vec<&str> = c.verdict_changing_trials().map(|t| t.change.number.name()).collect();
+            let mut hangs: Vec<&str> = c.verdict_changing_trials().map(|t| t.change.value.name()).collect();
             hangs.dedup();
             let carried = |says: CriterionResult| c.sensitivities.iter().filter(|s| s.says == says).count();
             let carries = if c.sensitivities.is_empty() {
@@ -58,9 +58,9 @@ fn summary(claims: &[Claim], study: &Study) -> Section {
     Section::new("Claims")
         .text(format!(
             "The primary condition is the paper's own protocol and decides alone: from it one effect with its 95 % interval over the noise seeds {first} to {last}. \
-             Supported: the whole interval on the claim's side of the bar; contradicted: on the other side; undecided: neither. Assumed: a number that we chose \
+             Supported: the whole interval on the claim's side of the limit; contradicted: on the other side; undecided: neither. Assumed: a number that we chose \
              decides, because the effect changes sides when it is halved or doubled. Untestable: no simulation can say. Sensitivity conditions say how far a \
-             claim carries and change no verdict. Protocols and bars were written down before the numbers were computed; claims/README.md lists at its end what was changed afterwards, and why. S: supplement, M: main paper."
+             claim carries and change no verdict. Protocols and criteria were written down before the numbers were computed; claims/README.md lists at its end what was changed afterwards, and why. S: supplement, M: main paper."
         ))
         .text(
             "The intervals hold the noise of the simulated sensor and nothing else: not the scatter of real gels, not the error of the law. A narrow one says that \
@@ -73,9 +73,9 @@ fn summary(claims: &[Claim], study: &Study) -> Section {
                     "claim (the paper's)",
                     "verdict (computed)",
                     "effect (computed)",
-                    "bar (ours)",
+                    "criterion (ours)",
                     "primary condition (computed)",
-                    "hangs on numbers of ours (computed)",
+                    "depends on assumed values (computed)",
                     "sensitivity conditions in which it holds (computed)",
                 ]
                 .map(String::from)
@@ -100,7 +100,7 @@ fn conditions(title: &str, list: &[Condition]) -> Table {
             ]
         })
         .collect();
-    let headers = ["condition", "effect", "bar (ours)", "says", "seeds with a value"];
+    let headers = ["condition", "effect", "criterion (ours)", "says", "seeds with a value"];
     SourcedTable::computed(Table {
         title: title.to_owned(),
         headers: headers.map(String::from).to_vec(),
@@ -181,11 +181,11 @@ fn figure(figure: Figure) -> Section {
 fn tunings(study: &Study) -> Table {
     let rows = study
         .tunings()
-        .filter(|((recorded, _), _)| recorded.change.is_none())
-        .map(|((recorded, sensor), t)| {
-            let noise = format!("{} mN", recorded.noise_mn);
+        .filter(|((recording_key, _), _)| recording_key.change.is_none())
+        .map(|((recording_key, sensor), t)| {
+            let noise = format!("{} mN", recording_key.noise_mn);
             vec![
-                Cell::text(format!("{}, {} sensor", recorded.case.name(), sensor.name())),
+                Cell::text(format!("{}, {} sensor", recording_key.case.name(), sensor.name())),
                 Cell::number(noise),
                 Cell::number(format!("{}", t.sigma_rupture_n)),
                 Cell::number(format!("{}", t.on_n_per_s)),

@@ -79,7 +79,7 @@ pub struct Input {
     /// Reference or reason.
     pub why: &'static str,
     /// Name of its halved and doubled variants, if there are any.
-    pub number: Option<AssumedValue>,
+    pub assumed_value: Option<AssumedValue>,
 }
 
 fn list(scenario: &Scenario, scale: f64, of: impl Fn(&stylet_tissue::Layer) -> f64) -> String {
@@ -125,7 +125,7 @@ fn tissue(case: Case) -> [(Class, &'static str); 4] {
     }
 }
 
-const fn numbers(case: Case) -> [Option<AssumedValue>; 4] {
+const fn assumed_values(case: Case) -> [Option<AssumedValue>; 4] {
     if case.is_stack() {
         [
             None,
@@ -151,36 +151,36 @@ const fn numbers(case: Case) -> [Option<AssumedValue>; 4] {
 #[must_use]
 pub fn inputs(case: Case, scenario: &Scenario) -> Vec<Input> {
     let mut all = Vec::new();
-    let mut add = |name: &str, value: String, class, why, number| {
-        all.push(Input { name: name.to_owned(), value, class, why, number });
+    let mut add = |name: &str, value: String, class, why, assumed_value| {
+        all.push(Input { name: name.to_owned(), value, class, why, assumed_value });
     };
     let [thickness, stiffness, friction, puncture] = tissue(case);
-    let number = numbers(case);
+    let assumed = assumed_values(case);
     add(
         "thickness",
         format!("{} mm", list(scenario, 1e3, |l| l.thickness_m)),
         thickness.0,
         thickness.1,
-        number[0],
+        assumed[0],
     );
     add(
         "K",
         format!("{} N/m", list(scenario, 1.0, |l| l.stiffness_n_per_m)),
         stiffness.0,
         stiffness.1,
-        number[1],
+        assumed[1],
     );
     add(
         "b",
         format!("{} N s/m²", list(scenario, 1.0, |l| l.friction_ns_per_m2)),
         friction.0,
         friction.1,
-        number[2],
+        assumed[2],
     );
     if scenario.tissue.layers.iter().any(|l| l.puncture_n.is_some()) {
         let text = |l: &stylet_tissue::Layer| l.puncture_n.map_or("–".to_owned(), |f| significant(f, 3));
         let values: Vec<String> = scenario.tissue.layers.iter().map(text).collect();
-        add("puncture force", format!("{} N", values.join(" / ")), puncture.0, puncture.1, number[3]);
+        add("puncture force", format!("{} N", values.join(" / ")), puncture.0, puncture.1, assumed[3]);
     }
     let behind = AssumedValue::TimeBehindTarget.enters(case).then_some(AssumedValue::TimeBehindTarget);
     match scenario.motion {
@@ -297,7 +297,7 @@ mod tests {
                 assert_ne!(input.class, Class::Computed, "{case:?} {}", input.name);
                 assert!(
                     input
-                        .number
+                        .assumed_value
                         .is_none_or(|n| matches!(n, AssumedValue::Noise | AssumedValue::VirtualSigma)
                             || n.enters(case)),
                     "{case:?}"

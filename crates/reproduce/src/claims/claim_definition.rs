@@ -34,7 +34,7 @@ pub struct Definition {
     /// Sensitivity conditions.
     pub sensitivities: Vec<Sensitivity>,
     /// Assumed values that enter the primary condition.
-    pub numbers: Vec<AssumedValue>,
+    pub assumed_values: Vec<AssumedValue>,
     /// Whether the simulated arm is used.
     pub on_arm: bool,
 }
@@ -67,20 +67,20 @@ impl Definition {
         protocol: &'static str,
         measure: Measure,
         bar: Criterion,
-        numbers: &[AssumedValue],
+        assumed_values: &[AssumedValue],
     ) -> Self {
         Self {
             protocol,
             primary: Some((measure, bar)),
             sensitivities: Vec::new(),
-            numbers: numbers.to_vec(),
+            assumed_values: assumed_values.to_vec(),
             on_arm: false,
         }
     }
 
     /// A claim that no simulation can test.
     pub(super) const fn untestable(protocol: &'static str) -> Self {
-        Self { protocol, primary: None, sensitivities: Vec::new(), numbers: Vec::new(), on_arm: false }
+        Self { protocol, primary: None, sensitivities: Vec::new(), assumed_values: Vec::new(), on_arm: false }
     }
 
     /// Adds a sensitivity condition with the criterion of the claim.
@@ -115,7 +115,7 @@ impl Definition {
         let parts = measured.parts();
         let says = bar.evaluate(&effect);
         let trials: Vec<Trial> = self
-            .numbers
+            .assumed_values
             .iter()
             .flat_map(|n| n.changes())
             .map(|change| {
@@ -170,13 +170,13 @@ mod tests {
         let (holds, fails): (Measure, Measure) = (|v| constant(v, 0.0), |v| constant(v, 2.0));
         // Contradicted alone when the noise is doubled: the number decides.
         let hangs: Measure = |v| constant(v, if v.noise_mn > NOISE_MN { 2.0 } else { 0.0 });
-        for (primary, numbers, expected) in [
+        for (primary, assumed_values, expected) in [
             (holds, &[AssumedValue::Noise][..], Verdict::Supported),
             (fails, &[AssumedValue::Noise], Verdict::Contradicted),
             (hangs, &[AssumedValue::Noise], Verdict::Assumed),
             (hangs, &[], Verdict::Supported),
         ] {
-            let plain = Definition::new(protocol!("e"), primary, Criterion::Below(1.0), numbers);
+            let plain = Definition::new(protocol!("e"), primary, Criterion::Below(1.0), assumed_values);
             let alone = plain.evaluate(&study);
             assert_eq!(alone.verdict, expected);
             for more in [

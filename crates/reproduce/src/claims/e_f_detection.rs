@@ -39,15 +39,17 @@ const ON_THE_ARM: [Insertion; 2] = [
     (Case::LiverArm, Sensor::ForceTorque, Setup::Tuned),
     (Case::AbdomenArm, Sensor::ForceTorque, Setup::Tuned),
 ];
-const OURS: [Insertion; 2] =
-    [(Case::LiverArm, Sensor::Virtual, Setup::Own), (Case::AbdomenArm, Sensor::Virtual, Setup::Own)];
+const OURS: [Insertion; 2] = [
+    (Case::LiverArm, Sensor::Virtual, Setup::ScenarioThresholds),
+    (Case::AbdomenArm, Sensor::Virtual, Setup::ScenarioThresholds),
+];
 const WITH_FRICTION: [Insertion; 2] = [
-    (Case::LiverArmFriction, Sensor::Virtual, Setup::Own),
-    (Case::AbdomenArmFriction, Sensor::Virtual, Setup::Own),
+    (Case::LiverArmFriction, Sensor::Virtual, Setup::ScenarioThresholds),
+    (Case::AbdomenArmFriction, Sensor::Virtual, Setup::ScenarioThresholds),
 ];
 
 pub(super) fn definitions() -> [Definition; 2] {
-    let numbers = [
+    let assumed_values = [
         AssumedValue::Noise,
         AssumedValue::StackStiffness,
         AssumedValue::StackFriction,
@@ -55,11 +57,11 @@ pub(super) fn definitions() -> [Definition; 2] {
         AssumedValue::TravelInAir,
     ];
     let primary = |v: &View<'_>| found(v, &stack(Setup::Tuned), false);
-    let latex = Definition::new(protocol!("e"), primary, NEARLY_ALL, &numbers)
+    let latex = Definition::new(protocol!("e"), primary, NEARLY_ALL, &assumed_values)
         .with_sensitivity("Kelvin-Voigt model", |v| found(v, &stack(Setup::Tuned), true))
         .with_sensitivity("to the letter (Literal)", |v| found(v, &stack(Setup::Literal), false))
         .with_sensitivity("derivative on drops (Drop)", |v| found(v, &stack(Setup::FallingForce), false));
-    let numbers = [
+    let assumed_values = [
         AssumedValue::Noise,
         AssumedValue::LiverStiffness,
         AssumedValue::LiverFriction,
@@ -72,7 +74,7 @@ pub(super) fn definitions() -> [Definition; 2] {
         AssumedValue::VirtualSigma,
     ];
     let primary = |v: &View<'_>| found(v, &either_sensor(Setup::Tuned), false);
-    let mut sensors = Definition::new(protocol!("f1"), primary, NEARLY_ALL, &numbers)
+    let mut sensors = Definition::new(protocol!("f1"), primary, NEARLY_ALL, &assumed_values)
         .with_sensitivity("Kelvin-Voigt model", |v| found(v, &either_sensor(Setup::Tuned), true))
         .with_sensitivity("force/torque sensor on the arm", |v| found(v, &ON_THE_ARM, false))
         .with_sensitivity("virtual sensor with our detection (s1 0.015 N)", |v| found(v, &OURS, false))

@@ -16,7 +16,7 @@ const POORLY: Criterion = Criterion::Above(2.0);
 const TARGETS: [Case; 3] = [Case::Gel70Constant, Case::LatexSinusoidal, Case::Liver];
 
 /// Assumed values of one gel, stack and liver.
-pub(super) const NUMBERS: [AssumedValue; 13] = [
+pub(super) const ASSUMED_VALUES: [AssumedValue; 13] = [
     AssumedValue::Noise,
     AssumedValue::GelStiffness,
     AssumedValue::GelFriction,
@@ -46,7 +46,7 @@ fn ratio(view: &View<'_>, cases: &[Case]) -> Measured {
 }
 
 pub(super) fn definition() -> Definition {
-    Definition::new(protocol!("g"), |v| ratio(v, &TARGETS), POORLY, &NUMBERS)
+    Definition::new(protocol!("g"), |v| ratio(v, &TARGETS), POORLY, &ASSUMED_VALUES)
         .with_sensitivity("quadratic elasticity (Okamura 2004)", |v| ratio(v, &[Case::LiverQuadratic]))
         .with_sensitivity(KNOWN_DEPTH, |v| ratio(&with_known_depth(v), &TARGETS))
         .with_sensitivity(PUBLISHED_TUNING, |v| ratio(&with_published_tuning(v), &TARGETS))

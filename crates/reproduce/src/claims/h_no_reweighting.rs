@@ -4,7 +4,7 @@
 use super::claim_definition::{
     Definition, KNOWN_DEPTH, PUBLISHED_TUNING, protocol, with_known_depth, with_published_tuning,
 };
-use super::g_resets_only_at_ruptures::NUMBERS;
+use super::g_resets_only_at_ruptures::ASSUMED_VALUES;
 use crate::algorithm_variant::Ablation;
 use crate::effect_size::{Criterion, ExperimentValues, Measured, Scale};
 use crate::paper_experiments::Case;
@@ -38,13 +38,13 @@ fn compensation(view: &View<'_>) -> Measured {
 }
 
 pub(super) fn reconstructs() -> Definition {
-    Definition::new(protocol!("h1"), reconstruction, Criterion::Below(0.5), &NUMBERS)
+    Definition::new(protocol!("h1"), reconstruction, Criterion::Below(0.5), &ASSUMED_VALUES)
         .with_sensitivity(KNOWN_DEPTH, |v| reconstruction(&with_known_depth(v)))
         .with_sensitivity(PUBLISHED_TUNING, |v| reconstruction(&with_published_tuning(v)))
 }
 
 pub(super) fn compensates() -> Definition {
-    Definition::new(protocol!("h2"), compensation, Criterion::Below(0.1), &NUMBERS)
+    Definition::new(protocol!("h2"), compensation, Criterion::Below(0.1), &ASSUMED_VALUES)
         .with_sensitivity(KNOWN_DEPTH, |v| compensation(&with_known_depth(v)))
         .with_sensitivity(PUBLISHED_TUNING, |v| compensation(&with_published_tuning(v)))
 }

@@ -43,7 +43,7 @@ fn enhanced(outcome: &Outcome) -> Option<f64> {
     outcome.score.enhancement.rms_relative
 }
 
-const NUMBERS: [AssumedValue; 15] = [
+const ASSUMED_VALUES: [AssumedValue; 15] = [
     AssumedValue::Noise,
     AssumedValue::GelStiffness,
     AssumedValue::GelFriction,
@@ -62,11 +62,16 @@ const NUMBERS: [AssumedValue; 15] = [
 ];
 
 pub(super) fn definition() -> Definition {
-    Definition::new(protocol!("i"), |v| larger_over_smaller(v, Scale::Ratio, enhanced), EQUIVALENT, &NUMBERS)
-        .with_sensitivity("reconstruction error instead of the enhanced force's", |v| {
-            larger_over_smaller(v, Scale::Ratio, |o| o.score.reconstruction_rms_n)
-        })
-        .with_sensitivity("the insertion that differs most", |v| {
-            larger_over_smaller(v, Scale::LargestRatio, enhanced)
-        })
+    Definition::new(
+        protocol!("i"),
+        |v| larger_over_smaller(v, Scale::Ratio, enhanced),
+        EQUIVALENT,
+        &ASSUMED_VALUES,
+    )
+    .with_sensitivity("reconstruction error instead of the enhanced force's", |v| {
+        larger_over_smaller(v, Scale::Ratio, |o| o.score.reconstruction_rms_n)
+    })
+    .with_sensitivity("the insertion that differs most", |v| {
+        larger_over_smaller(v, Scale::LargestRatio, enhanced)
+    })
 }

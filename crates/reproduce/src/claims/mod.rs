@@ -70,8 +70,13 @@ mod tests {
             assert_eq!(bar, protocol.section("Supported when"), "{}", protocol.id);
             let names: Vec<&str> = definition.sensitivities.iter().map(|s| s.name).collect();
             assert_eq!(names, protocol.list("Sensitivity conditions"), "{}", protocol.id);
-            let numbers: Vec<&str> = definition.numbers.iter().map(|n| n.name()).collect();
-            assert_eq!(numbers, protocol.list("Numbers of ours, halved and doubled"), "{}", protocol.id);
+            let assumed_values: Vec<&str> = definition.assumed_values.iter().map(|n| n.name()).collect();
+            assert_eq!(
+                assumed_values,
+                protocol.list("Numbers of ours, halved and doubled"),
+                "{}",
+                protocol.id
+            );
             for heading in
                 ["The paper says", "Source", "Primary condition", "Effect", "Assumed", "Untestable"]
             {

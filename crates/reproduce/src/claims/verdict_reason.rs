@@ -5,7 +5,7 @@ use crate::claim_verdict::Trial;
 use crate::effect_size::CriterionResult;
 use std::fmt::Write as _;
 
-/// Names with their effects: `depth with_known_depth 0.93 (0.91 to 0.95)`.
+/// Names with their effects: `depth known 0.93 (0.91 to 0.95)`.
 fn list<'a>(conditions: impl Iterator<Item = &'a Condition>) -> String {
     conditions.map(|c| format!("{} {}", c.name, c.effect.words())).collect::<Vec<_>>().join("; ")
 }
@@ -16,13 +16,14 @@ pub(super) fn reason(primary: &Primary, trials: &[Trial], sensitivities: &[Condi
     let says = match (primary.says, primary.effect.interval.is_some()) {
         (CriterionResult::Supports, _) => "the whole interval is on the claim's side",
         (CriterionResult::Contradicts, _) => "the whole interval is on the other side",
-        (CriterionResult::Undecided, true) => "the interval holds the bar",
+        (CriterionResult::Undecided, true) => "the interval contains the limit",
         (CriterionResult::Undecided, false) => "too few seeds give a value",
     };
-    let mut text = format!("The primary condition gives {}, asked is {bar}: {says}.", primary.effect.words());
+    let mut text =
+        format!("The primary condition gives {}; the criterion is {bar}: {says}.", primary.effect.words());
     let others: Vec<&Condition> = primary.parts.iter().filter(|p| p.says != primary.says).collect();
     if primary.parts.len() > 1 && !others.is_empty() {
-        let _ = write!(text, " Otherwise alone: {}.", list(others.into_iter()));
+        let _ = write!(text, " Other results of single experiments: {}.", list(others.into_iter()));
     }
     let deciding: Vec<String> = trials
         .iter()
@@ -33,12 +34,12 @@ pub(super) fn reason(primary: &Primary, trials: &[Trial], sensitivities: &[Condi
         if !trials.is_empty() {
             let _ = write!(
                 text,
-                " None of the {} numbers of ours, halved or doubled, changes that.",
+                " None of the {} assumed values, halved or doubled, changes that.",
                 trials.len() / 2
             );
         }
     } else {
-        let _ = write!(text, " It hangs on numbers of ours: {}.", deciding.join("; "));
+        let _ = write!(text, " It depends on assumed values: {}.", deciding.join("; "));
     }
     for (says, verb) in [
         (CriterionResult::Supports, "It holds with"),

@@ -45,7 +45,7 @@ impl FigureRecording {
             Sensor::ForceTorque => insertion.reading(seed, NOISE_MN),
             Sensor::Virtual => insertion.force_n(sensor).to_vec(),
         };
-        let tuning = study.tuning(View::primary(study).recorded(case), sensor);
+        let tuning = study.tuning(View::primary(study).recording_key(case), sensor);
         Ok(Self { insertion, force_n, sensor, seed, tuning })
     }
 }

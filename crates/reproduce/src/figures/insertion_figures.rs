@@ -182,7 +182,7 @@ fn numbers(study: &Study, spec: &Spec) -> SourcedTable {
                 let runs = view.runs(spec.case, spec.sensor, kelvin_voigt, Ablation::None);
                 let found = runs.iter().filter(|o| o.found_all()).count();
                 let of = |value: &dyn Fn(&Outcome) -> Option<f64>| Spread::of(runs.iter().map(value));
-                let tuning = study.tuning(view.recorded(spec.case), spec.sensor);
+                let tuning = study.tuning(view.recording_key(spec.case), spec.sensor);
                 let model = if kelvin_voigt { "KV" } else { "ML" };
                 let noise = if spec.sensor == Sensor::Virtual {
                     "virtual".to_owned()

@@ -81,7 +81,7 @@ fn layers(data: &FigureData<'_>) -> String {
 }
 
 const EXIT_REASON: &str =
-    "how large the drop at the exit is follows from K, which is ours: see claim c1's numbers of ours";
+    "how large the drop at the exit is follows from K, which is ours: see the assumed values of claim c1";
 const TIME_REASON: &str = "our recording begins with 5 mm of air; thickness from this very time";
 const AFTER_EXIT_REASON: &str =
     "here noise and the error of b are all that can stay; real friction is not purely viscous";
