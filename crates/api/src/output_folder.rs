@@ -48,7 +48,7 @@ const RESULT_FILES: [(&str, &str); 12] = [
 pub struct OutputLock {
     folder: PathBuf,
     /// Folders created for it; the empty ones are removed on drop.
-    made: Vec<PathBuf>,
+    created_folders: Vec<PathBuf>,
     /// Whether files are staged that are not committed.
     staging: AtomicBool,
     _lock: Option<File>,
@@ -120,13 +120,17 @@ impl OutputLock {
     }
 
     fn acquire(folder: &Path, try_lock: impl Fn(&File) -> Result<(), TryLockError>) -> Result<Self, Error> {
-        let made: Vec<PathBuf> = folder
+        let created_folders: Vec<PathBuf> = folder
             .ancestors()
             .take_while(|f| !f.as_os_str().is_empty() && !f.exists())
             .map(Path::to_path_buf)
             .collect();
-        let mut lock =
-            Self { folder: folder.to_path_buf(), made, staging: AtomicBool::new(false), _lock: None };
+        let mut lock = Self {
+            folder: folder.to_path_buf(),
+            created_folders,
+            staging: AtomicBool::new(false),
+            _lock: None,
+        };
         fs::create_dir_all(folder).map_err(|why| failed(folder, why))?;
         // Not every system and network disk can lock a folder; there the lock has no effect.
         if let Ok(file) = File::open(folder) {
@@ -246,7 +250,7 @@ impl Drop for OutputLock {
         if self.staging.load(Ordering::Relaxed) {
             let _ = fs::remove_dir_all(self.folder.join(STAGING_FOLDER));
         }
-        for folder in &self.made {
+        for folder in &self.created_folders {
             // Fails for folders that are not empty, as intended.
             let _ = fs::remove_dir(folder);
         }
