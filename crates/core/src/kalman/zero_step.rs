@@ -97,7 +97,8 @@ impl KalmanEnhancer {
         bias + at_least(0.0, least * self.friction_drive_mps)
     }
 
-    /// Starts the test of a step of the zero against the rupture about to be declared, from the estimator before the drop. `None` if a step of the zero is excluded.
+    /// Starts the test of a step of the zero against the rupture about to be declared, from the estimator before the drop. `None` if a
+    /// step of the zero is excluded.
     pub(super) fn start_zero_step_test(&self, sample: &Sample) -> Option<ZeroStepTest> {
         let candidate = self.candidate?;
         if self.misfit_weight > 0.0 || candidate.count > JUMP_SAMPLES || self.snapshot.tip_free {
