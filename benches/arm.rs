@@ -43,17 +43,17 @@ fn whole<Body: ArmBody>(i: &Insertion, sensor: bool) -> f64 {
     let first = i.plan.at(0.0);
     let sensor = sensor.then_some(&i.sensor);
     let config = ArmConfig::default();
-    let rig = ArmSimulation::<Body>::new(&config, sensor, &i.line, &first, first.position_m, DT_S, 1);
-    let Ok(mut rig) = rig else { return f64::NAN };
+    let simulation = ArmSimulation::<Body>::new(&config, sensor, &i.line, &first, first.position_m, DT_S, 1);
+    let Ok(mut simulation) = simulation else { return f64::NAN };
     let mut state = ForceLawState::default();
     let mut sum = 0.0;
     for k in 0..STEPS {
         // From 2 s on: the tip enters the tissue on the way.
         let t = k as f64 * DT_S;
-        let moment = rig
+        let arm_step = simulation
             .step(&i.plan.at(t), k % 5 == 0, |z, v| i.law.step(&mut state, t, z + 0.003, v, |_| {}).total_n);
-        let Ok(moment) = moment else { return f64::NAN };
-        sum += moment.virtual_force_n.unwrap_or(moment.position_m);
+        let Ok(arm_step) = arm_step else { return f64::NAN };
+        sum += arm_step.virtual_force_n.unwrap_or(arm_step.position_m);
     }
     sum
 }

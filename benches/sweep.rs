@@ -96,13 +96,13 @@ impl Parts {
     fn score(&self, enhanced: &[EnhancedSample]) {
         let mut scorer = self.scorer();
         for ((s, tip_n), enhanced) in self.samples.iter().zip(&self.tips).zip(enhanced) {
-            let moment = TrueSample {
+            let sample_truth = TrueSample {
                 position_m: s.position_m,
                 force_n: s.force_n,
                 tip_n: *tip_n,
                 total_n: s.force_n,
             };
-            scorer.add_sample(&moment, enhanced);
+            scorer.add_sample(&sample_truth, enhanced);
         }
         black_box(scorer.finish());
     }

@@ -84,7 +84,7 @@ fn rows(page: &str) -> Vec<Vec<String>> {
 }
 
 #[test]
-fn every_constant_of_the_diagnosis_stands_in_the_table_with_its_value_and_reason() {
+fn every_constant_of_the_diagnosis_is_in_the_table_with_its_value_and_reason() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let page = std::fs::read_to_string(root.join("crates/diagnose/CONSTANTS.md"))
         .expect("crates/diagnose/CONSTANTS.md");

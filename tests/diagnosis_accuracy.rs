@@ -56,8 +56,8 @@ fn clean_data_give_no_cause_and_strong_effects_are_identified() {
     println!("{table}");
     let clean: Vec<_> = outcomes.iter().filter(|o| o.id.hide == Hide::Clean).collect();
     assert_eq!(clean.len(), 4);
-    assert!(clean.iter().all(|o| o.worth.correct), "{table}");
-    let found = outcomes.iter().filter(|o| o.id.hide == Hide::One && o.worth.correct).count();
+    assert!(clean.iter().all(|o| o.score.correct), "{table}");
+    let found = outcomes.iter().filter(|o| o.id.hide == Hide::One && o.score.correct).count();
     assert!(found >= 3, "{table}");
     // The hidden effects were significant.
     assert!(outcomes.iter().any(|o| o.strength_sd > 5.0));
@@ -74,7 +74,7 @@ fn a_cutting_force_with_steps_like_ruptures_is_identified() {
     assert_eq!(cases.len(), 3);
     let outcomes = run_cases(&cases, None, &answer, &|_, _| {}).expect("a run");
     let table = results_table::results_text(&outcomes);
-    assert!(outcomes.iter().all(|o| o.hidden == ["cutting_force"] && o.worth.correct), "{table}");
+    assert!(outcomes.iter().all(|o| o.hidden == ["cutting_force"] && o.score.correct), "{table}");
 }
 
 /// Whether the shift of a boundary is larger than two standard deviations of the assumed thickness.
@@ -104,12 +104,12 @@ fn a_shifted_boundary_is_distinguished_from_slightly_wrong_thicknesses() {
     assert_eq!(cases.len(), 6);
     let outcomes = run_cases(&cases, None, &answer, &|_, _| {}).expect("a run");
     let table = results_table::results_text(&outcomes);
-    assert!(outcomes.iter().all(|o| o.hidden == ["boundary_shift"] && o.worth.correct), "{table}");
+    assert!(outcomes.iter().all(|o| o.hidden == ["boundary_shift"] && o.score.correct), "{table}");
     let shifts: Vec<_> =
-        outcomes.iter().flat_map(|o| &o.numbers).filter(|n| n.name == "boundary_shift.shift_m").collect();
+        outcomes.iter().flat_map(|o| &o.parameters).filter(|n| n.name == "boundary_shift.shift_m").collect();
     assert!(
         shifts.len() == cases.len()
-            && shifts.iter().filter(|n| n.held == Some(true)).count() + 1 >= cases.len(),
+            && shifts.iter().filter(|n| n.interval_covers == Some(true)).count() + 1 >= cases.len(),
         "{table}"
     );
 }
@@ -129,8 +129,8 @@ fn a_rate_dependent_puncture_force_is_identified_under_wrong_assumptions() {
     let table = results_table::results_text(&outcomes);
     let (clean, one): (Vec<_>, Vec<_>) = outcomes.iter().partition(|o| o.id.hide == Hide::Clean);
     assert_eq!((clean.len(), one.len()), (4, 4));
-    assert!(clean.iter().all(|o| o.worth.correct), "{table}");
-    assert!(one.iter().all(|o| o.hidden == ["rate_dependent_puncture"] && o.worth.correct), "{table}");
+    assert!(clean.iter().all(|o| o.score.correct), "{table}");
+    assert!(one.iter().all(|o| o.hidden == ["rate_dependent_puncture"] && o.score.correct), "{table}");
 }
 
 /// Two spectral lines close together and of equal size are no single tone.
@@ -140,7 +140,7 @@ fn beats_are_not_identified_as_a_tone() {
     let outcomes =
         run_cases(&[case(Wrong::Nothing, Hide::Outside, 142, 6)], None, &answer, &|_, _| {}).expect("a run");
     let table = results_table::results_text(&outcomes);
-    assert!(outcomes.iter().all(|o| o.hidden == ["beats_in_time"] && o.worth.correct), "{table}");
+    assert!(outcomes.iter().all(|o| o.hidden == ["beats_in_time"] && o.score.correct), "{table}");
 }
 
 /// Sensor drift must neither imitate a boundary shift nor hide a tone in the coloured noise.
@@ -153,7 +153,7 @@ fn sensor_drift_is_no_boundary_shift_and_hides_no_tone() {
     }
     let outcomes = run_cases(&cases, None, &answer, &|_, _| {}).expect("a run");
     let table = results_table::results_text(&outcomes);
-    assert!(outcomes.iter().all(|o| o.worth.correct), "{table}");
+    assert!(outcomes.iter().all(|o| o.score.correct), "{table}");
     assert_eq!(outcomes.iter().filter(|o| o.hidden == ["periodic_interference"]).count(), 2);
 }
 

@@ -184,7 +184,7 @@ fn out_of(scratch: &Scratch) -> PathBuf {
 }
 
 #[test]
-fn run_and_sweep_survive_every_fault_at_every_third_call() {
+fn run_and_sweep_leave_consistent_files_after_every_fault_at_every_third_call() {
     let scratch = Scratch::in_memory("faults");
     let Some(shim) = shim(scratch.path()) else { return };
     let cases = cases(&scratch);
@@ -195,7 +195,7 @@ fn run_and_sweep_survive_every_fault_at_every_third_call() {
 
 #[test]
 #[ignore = "minutes; tests/disk_faults.sh"]
-fn all_commands_survive_every_fault_at_every_call() {
+fn all_commands_leave_consistent_files_after_every_fault_at_every_call() {
     let scratch = Scratch::in_memory("faults-all");
     let Some(shim) = shim(scratch.path()) else { return };
     for case in cases(&scratch) {

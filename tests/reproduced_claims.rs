@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use std::sync::OnceLock;
 use stylet_reproduce::all_runs::Study;
 use stylet_reproduce::claims::{self, Claim, Sensitivity, definitions};
-use stylet_reproduce::effect_size::{Bar, Measured, Part, Scale};
+use stylet_reproduce::effect_size::{Criterion, ExperimentValues, Measured, Scale};
 use stylet_reproduce::{Reproduction, plan, reproduce};
 
 /// Seeds of every test run.
@@ -33,9 +33,9 @@ fn expected() -> Value {
 
 /// The claims of a study that runs only the required conditions.
 fn claims_of(first_seed: u64, seeds: u64) -> Vec<Claim> {
-    let asking = Study::asking(first_seed, seeds);
-    let _ = claims::all(&asking);
-    claims::all(&Study::run(&asking.plan(), &|| {}).expect("shipped scenarios"))
+    let planning = Study::planning(first_seed, seeds);
+    let _ = claims::all(&planning);
+    claims::all(&Study::run(&planning.plan(), &|| {}).expect("shipped scenarios"))
 }
 
 /// The differences, with their paths: numbers by more than 1e-9, everything else exactly.
@@ -132,10 +132,10 @@ fn verdicts_are_stable_over_two_disjoint_sets_of_fifty_seeds() {
 fn contrary() -> Sensitivity {
     Sensitivity {
         name: "added",
-        bar: Bar::Above(1e9),
+        bar: Criterion::Above(1e9),
         measure: |view| Measured {
             scale: Scale::Mean,
-            parts: vec![Part::new("nothing holds", vec![Some(0.0); view.seeds as usize])],
+            parts: vec![ExperimentValues::new("nothing holds", vec![Some(0.0); view.seeds as usize])],
         },
     }
 }
@@ -144,14 +144,14 @@ fn contrary() -> Sensitivity {
 #[ignore = "every claim under every condition"]
 fn no_verdict_changes_when_a_sensitivity_condition_is_added_or_removed() {
     let all = definitions();
-    let asking = Study::asking(1, FEW);
+    let planning = Study::planning(1, FEW);
     for definition in &all {
-        let _ = definition.judge(&asking);
+        let _ = definition.evaluate(&planning);
     }
-    let study = Study::run(&asking.plan(), &|| {}).expect("shipped scenarios");
+    let study = Study::run(&planning.plan(), &|| {}).expect("shipped scenarios");
     let mut tried = 0;
     for definition in all.iter().filter(|d| d.primary.is_some()) {
-        let whole = definition.judge(&study);
+        let whole = definition.evaluate(&study);
         let mut others = vec![{
             let mut more = definition.clone();
             more.sensitivities.push(contrary());
@@ -163,7 +163,7 @@ fn no_verdict_changes_when_a_sensitivity_condition_is_added_or_removed() {
             others.push(fewer);
         }
         for other in others {
-            let judged = other.judge(&study);
+            let judged = other.evaluate(&study);
             assert_eq!(judged.verdict, whole.verdict, "({})", whole.id);
             assert_eq!(judged.primary, whole.primary, "({})", whole.id);
             assert_eq!(judged.trials, whole.trials, "({})", whole.id);
@@ -171,7 +171,7 @@ fn no_verdict_changes_when_a_sensitivity_condition_is_added_or_removed() {
         }
     }
     let conditions: usize = all.iter().map(|d| d.sensitivities.len()).sum();
-    // The conditions really were others: one less each, and one more for every claim that runs can judge.
+    // The conditions really were others: one less each, and one more for every claim that runs can test.
     assert_eq!(tried, conditions + all.iter().filter(|d| d.primary.is_some()).count());
     assert!(tried > 50, "{tried}");
 }
@@ -255,7 +255,7 @@ fn every_number_on_the_page_has_its_source_class() {
         19,
         "every figure is compared with the supplement"
     );
-    assert!(html.contains("Numbers of ours, and the verdicts that hang on them"));
+    assert!(html.contains("Assumed values, and the verdicts that depend on them"));
 }
 
 #[test]

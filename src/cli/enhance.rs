@@ -4,7 +4,8 @@ use crate::cli::args::EnhanceArgs;
 use crate::cli::exit_codes::Failure;
 use std::fmt::Write as _;
 use stylet_api::enhancement::{
-    EnhancementResult, ResultSource, enhance_long_recording, enhance_recording, impossible, unused_note,
+    EnhancementResult, ResultSource, enhance_long_recording, enhance_recording, impossible_estimates,
+    unused_note,
 };
 use stylet_api::output_folder::check_folder;
 use stylet_api::{IdentifiedModel, OutputLock, read_options, resource_estimate};
@@ -44,7 +45,7 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
         args.limits.check(&args.data, &estimate, args.results.quiet)?;
         let lock = OutputLock::new(&folder)?;
         if let Some((recording, notes)) = read_long_csv(&args.data, &options, &folder)? {
-            refuse_grave(args, &notes)?;
+            refuse_unusable_recording(args, &notes)?;
             let result =
                 enhance_long_recording(&recording, notes, config, &regressors, model.as_ref(), &lock)?;
             let summary = summary(args, &result);
@@ -58,14 +59,14 @@ pub fn enhance(args: &EnhanceArgs) -> Result<(), Failure> {
     let (recording, notes) = read_csv(&args.data, &options)?;
     let estimate = resource_estimate::estimate_enhance_samples(recording.len() as f64, regressors.len());
     args.limits.check(&args.data, &estimate, true)?;
-    refuse_grave(args, &notes)?;
+    refuse_unusable_recording(args, &notes)?;
     let result = enhance_recording(recording, notes, config, &regressors, model.as_ref())?;
     let summary = summary(args, &result);
     args.results.write_and_print(&folder, &result.output_files(&source)?.with_inputs(inputs), || summary)
 }
 
 /// Recordings with the wrong sign or unit would give wrong results.
-fn refuse_grave(args: &EnhanceArgs, notes: &[QualityNote]) -> Result<(), Failure> {
+fn refuse_unusable_recording(args: &EnhanceArgs, notes: &[QualityNote]) -> Result<(), Failure> {
     let grave =
         |kind| matches!(kind, QualityKind::Reversed | QualityKind::ReversedPosition | QualityKind::UnitMixUp);
     let found: Vec<&str> = notes
@@ -175,7 +176,7 @@ fn summary(args: &EnhanceArgs, result: &EnhancementResult) -> String {
                 interval(e.friction, e.friction_sd),
                 interval(e.drop_n, e.drop_sd_n),
             );
-            for what in impossible(e) {
+            for what in impossible_estimates(e) {
                 let _ = writeln!(out, "    impossible: {what}");
             }
         }

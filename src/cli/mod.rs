@@ -127,14 +127,14 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::from(exit_codes::DONE),
         Err(failure) => {
             let code = failure.code();
-            terminal_output::print_error(&rendered(failure));
+            terminal_output::print_error(&error_text(failure));
             code
         }
     }
 }
 
 /// The error with an excerpt of the source where that can be rendered, else the message alone.
-fn rendered(failure: Failure) -> String {
+fn error_text(failure: Failure) -> String {
     let message = failure.to_string();
     // Lines are left whole, so that commands in messages can be copied.
     let _ =

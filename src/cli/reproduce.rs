@@ -17,7 +17,7 @@ pub fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
     let folder = args.results.output_folder(Path::new("reproduce"), "");
     let started = Instant::now();
     let plan = stylet_reproduce::plan(args.first_seed, args.seeds);
-    let progress = Progress::new(plan.recordings_in_all(), "recordings", args.results.quiet);
+    let progress = Progress::new(plan.recording_count(), "recordings", args.results.quiet);
     let made = stylet_reproduce::reproduce(&plan, &|| progress.advance(1));
     progress.finish();
     let made = made.map_err(Failure::internal)?;
@@ -45,8 +45,8 @@ pub fn reproduce(args: &ReproduceArgs) -> Result<(), Failure> {
             text,
             "\n{} noise seeds, {} recordings, {} runs of the algorithm in {:.0} s\nPage: {}",
             args.seeds,
-            plan.recordings_in_all(),
-            plan.runs_in_all(),
+            plan.recording_count(),
+            plan.run_count(),
             started.elapsed().as_secs_f64(),
             folder.join("index.html").display()
         );

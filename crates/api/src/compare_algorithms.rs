@@ -109,11 +109,11 @@ fn count_detections(case: &Case, algorithm: Algorithm) -> DetectionCounts {
     let config = EnhanceConfig { algorithm, ..EnhanceConfig::default() };
     let surface_m = case.setup.assumed.surface_m;
     let mut all = DetectionCounts::default();
-    for (named, there) in case.question.recordings.iter().zip(&case.there) {
+    for (named, insertion) in case.question.recordings.iter().zip(&case.insertions) {
         let recording = &named.recording;
         let trace = Trace::run(recording, &recording.force_n, &config, surface_m, |_, _| {});
         let last_s = recording.time_s.last().copied().unwrap_or(0.0);
-        let truth: Vec<TrueRupture> = there
+        let truth: Vec<TrueRupture> = insertion
             .ruptures_s
             .iter()
             .filter(|t| **t < last_s)

@@ -36,7 +36,7 @@ pub struct RepeatsReport {
 
 /// `diagnosis.json`.
 #[derive(Serialize)]
-struct Written<'a> {
+struct DiagnosisFile<'a> {
     #[serde(flatten)]
     diagnosis: &'a Diagnosis,
     repeats: &'a RepeatabilityReport,
@@ -53,7 +53,7 @@ pub fn load_data_set(inputs: &DiagnosisInputs) -> Result<Dataset, Error> {
     } else {
         data_set_of(Scenario::load(&inputs.scenario)?)
     };
-    apply_reading(&mut set, inputs)?;
+    apply_read_options(&mut set, inputs)?;
     Ok(set)
 }
 
@@ -66,7 +66,7 @@ pub fn data_set_of_recordings(name: &str, inputs: &DiagnosisInputs) -> Result<(S
     let scenario = stylet_diagnose::scenario_from_recordings(name, &recordings, None)?;
     // Its numbers come from the recordings: there is nothing to compare.
     let mut set = Dataset { scenario: None, ..data_set_of(scenario.clone()) };
-    apply_reading(&mut set, inputs)?;
+    apply_read_options(&mut set, inputs)?;
     Ok((scenario, set))
 }
 
@@ -86,7 +86,7 @@ fn data_set_of(scenario: Scenario) -> Dataset {
     }
 }
 
-fn apply_reading(set: &mut Dataset, inputs: &DiagnosisInputs) -> Result<(), Error> {
+fn apply_read_options(set: &mut Dataset, inputs: &DiagnosisInputs) -> Result<(), Error> {
     set.repair = inputs.repair;
     if let Some(path) = &inputs.columns {
         set.columns = Some(stylet_scenario::load(path)?);
@@ -134,8 +134,8 @@ pub fn diagnose_repeats(
     }
     let named: Vec<(&str, &Recording)> = runs.iter().map(|r| (r.name.as_str(), &r.recording)).collect();
     check_distinct(&named)?;
-    let air = optional(set, set.air.as_deref(), given)?;
-    let load = optional(set, set.load.as_ref().map(|l| l.file.as_str()), given)?;
+    let air = read_optional_recording(set, set.air.as_deref(), given)?;
+    let load = read_optional_recording(set, set.load.as_ref().map(|l| l.file.as_str()), given)?;
     let known = load.as_ref().zip(set.load.as_ref()).map(|(r, l)| (r, l.force_n));
     let refs: Vec<&SegmentedRecording> = runs.iter().collect();
     let checks = ReferenceRecordings { air: air.as_ref(), load: known };
@@ -189,7 +189,7 @@ impl RepeatsReport {
         output.add("report.html", page(set, &file.to_string(), commands, study, online).to_html());
         output.add_json(
             "diagnosis.json",
-            &Written { diagnosis: &study.diagnosis, repeats: &study.report, online },
+            &DiagnosisFile { diagnosis: &study.diagnosis, repeats: &study.report, online },
         )?;
         output.add("extended.ron", ron);
         output.add("gain.svg", ablation_figure(study));
@@ -219,7 +219,11 @@ fn run_online(run: &SegmentedRecording, study: &SetDiagnosis, i: usize) -> Measu
 }
 
 /// Reads a recording of the data set; it may be missing if recordings were given explicitly.
-fn optional(set: &Dataset, file: Option<&str>, given: bool) -> Result<Option<Recording>, Error> {
+fn read_optional_recording(
+    set: &Dataset,
+    file: Option<&str>,
+    given: bool,
+) -> Result<Option<Recording>, Error> {
     let Some(file) = file else { return Ok(None) };
     let found = match find_files(file) {
         Ok(found) => found,

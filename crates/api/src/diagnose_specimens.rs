@@ -20,7 +20,7 @@ pub struct SpecimensReport {
 
 /// `diagnosis.json`.
 #[derive(Serialize)]
-struct Written<'a> {
+struct DiagnosisFile<'a> {
     #[serde(flatten)]
     diagnosis: &'a Diagnosis,
     specimens: &'a SpecimenReport,
@@ -48,7 +48,7 @@ impl SpecimensReport {
         let mut output = OutputFiles::default();
         let page = page(set, &inputs.scenario.display().to_string(), found, diagnosis);
         output.add("report.html", page.to_html());
-        output.add_json("diagnosis.json", &Written { diagnosis, specimens: found })?;
+        output.add_json("diagnosis.json", &DiagnosisFile { diagnosis, specimens: found })?;
         Ok(output)
     }
 }

@@ -10,7 +10,7 @@ mod superseded;
 
 use crate::error::Error;
 pub use manifest::MANIFEST;
-use manifest::{Manifest, hex, sum, sum_of_file};
+use manifest::{Manifest, hex, sha256, sha256_of_file};
 use replaceable::{Content, check_files, check_same_input, comparable, is_same};
 pub use replaceable::{Inputs, check_folder, check_own_file};
 use sha2::{Digest, Sha256};
@@ -21,11 +21,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use superseded::{kept_inputs, superseded_files};
 
 /// Subfolder in which a set is staged.
-const NEW: &str = ".stylet-new";
+const STAGING_FOLDER: &str = ".stylet-new";
 /// Subfolder of a complete set whose files are being moved to their places.
-const COMPLETE: &str = ".stylet-set";
+const COMPLETE_FOLDER: &str = ".stylet-set";
 /// Subfolder of the former files until the new ones are in place.
-const OLD: &str = ".stylet-old";
+const OLD_FOLDER: &str = ".stylet-old";
 
 /// The file by which the results of a command are recognised, and the command.
 const RESULT_FILES: [(&str, &str); 12] = [
@@ -48,7 +48,7 @@ const RESULT_FILES: [(&str, &str); 12] = [
 pub struct OutputLock {
     folder: PathBuf,
     /// Folders created for it; the empty ones are removed on drop.
-    made: Vec<PathBuf>,
+    created_folders: Vec<PathBuf>,
     /// Whether files are staged that are not committed.
     staging: AtomicBool,
     _lock: Option<File>,
@@ -99,10 +99,10 @@ impl OutputLock {
     /// # Errors
     /// [`Error::Output`] when it cannot be created, [`Error::Busy`] when another process holds it.
     pub fn new(folder: &Path) -> Result<Self, Error> {
-        let lock = Self::take(folder, File::try_lock)?;
+        let lock = Self::acquire(folder, File::try_lock)?;
         let recovered = || {
-            if folder.join(COMPLETE).exists() {
-                move_in(folder, &mut || false)?;
+            if folder.join(COMPLETE_FOLDER).exists() {
+                move_into_place(folder, &mut || false)?;
             }
             remove_scratch(folder)?;
             remove_staging(folder, &mut || false)
@@ -116,17 +116,21 @@ impl OutputLock {
     /// # Errors
     /// As [`OutputLock::new`].
     pub fn lock_shared(folder: &Path) -> Result<Self, Error> {
-        Self::take(folder, File::try_lock_shared)
+        Self::acquire(folder, File::try_lock_shared)
     }
 
-    fn take(folder: &Path, try_lock: impl Fn(&File) -> Result<(), TryLockError>) -> Result<Self, Error> {
-        let made: Vec<PathBuf> = folder
+    fn acquire(folder: &Path, try_lock: impl Fn(&File) -> Result<(), TryLockError>) -> Result<Self, Error> {
+        let created_folders: Vec<PathBuf> = folder
             .ancestors()
             .take_while(|f| !f.as_os_str().is_empty() && !f.exists())
             .map(Path::to_path_buf)
             .collect();
-        let mut lock =
-            Self { folder: folder.to_path_buf(), made, staging: AtomicBool::new(false), _lock: None };
+        let mut lock = Self {
+            folder: folder.to_path_buf(),
+            created_folders,
+            staging: AtomicBool::new(false),
+            _lock: None,
+        };
         fs::create_dir_all(folder).map_err(|why| failed(folder, why))?;
         // Not every system and network disk can lock a folder; there the lock has no effect.
         if let Ok(file) = File::open(folder) {
@@ -151,7 +155,7 @@ impl OutputLock {
     /// # Errors
     /// [`Error::Output`]; the folder is then unchanged.
     pub fn stage_file(&self, name: &'static str) -> Result<StagedFileWriter, Error> {
-        let new = self.folder.join(NEW);
+        let new = self.folder.join(STAGING_FOLDER);
         let made = fs::create_dir(&new).or_else(|why| match why.kind() {
             io::ErrorKind::AlreadyExists if self.staging.load(Ordering::Relaxed) => Ok(()),
             _ => Err(why),
@@ -189,7 +193,7 @@ impl OutputLock {
         let Err(why) = self.write_until(parts, files, old, &mut || false) else { return Ok(()) };
         let names = files.iter().map(|(name, _)| *name);
         let names = names.chain(parts.iter().map(|part| part.name)).chain([MANIFEST]);
-        if self.folder.join(COMPLETE).exists() && restore_old(&self.folder, names).is_err() {
+        if self.folder.join(COMPLETE_FOLDER).exists() && restore_old(&self.folder, names).is_err() {
             return Err(Error::Unfinished { path: self.folder.display().to_string(), why });
         }
         let _ = remove_staging(&self.folder, &mut || false);
@@ -212,7 +216,7 @@ impl OutputLock {
         if let Some(place) = names.map(|name| folder.join(name)).find(|place| place.is_dir()) {
             return Err(io::Error::other(format!("{} is a folder", place.display())));
         }
-        let new = folder.join(NEW);
+        let new = folder.join(STAGING_FOLDER);
         if parts.is_empty() {
             check_killed(killed)?;
             fs::create_dir(&new)?;
@@ -221,7 +225,7 @@ impl OutputLock {
         for (name, content) in files {
             check_killed(killed)?;
             synced(&new.join(name), content)?;
-            manifest.sha256.insert((*name).to_owned(), sum(content));
+            manifest.sha256.insert((*name).to_owned(), sha256(content));
         }
         for part in parts {
             manifest.sha256.insert(part.name.to_owned(), part.sha256.clone());
@@ -233,9 +237,9 @@ impl OutputLock {
         sync_names(&new)?;
         check_killed(killed)?;
         // Commit.
-        fs::rename(&new, folder.join(COMPLETE))?;
+        fs::rename(&new, folder.join(COMPLETE_FOLDER))?;
         sync_names(folder)?;
-        move_in(folder, killed)?;
+        move_into_place(folder, killed)?;
         // The new set is in place. Staging folders that cannot be removed now are left to the next command.
         remove_staging(folder, killed).or_else(|why| if is_kill(&why) { Err(why) } else { Ok(()) })
     }
@@ -244,9 +248,9 @@ impl OutputLock {
 impl Drop for OutputLock {
     fn drop(&mut self) {
         if self.staging.load(Ordering::Relaxed) {
-            let _ = fs::remove_dir_all(self.folder.join(NEW));
+            let _ = fs::remove_dir_all(self.folder.join(STAGING_FOLDER));
         }
-        for folder in &self.made {
+        for folder in &self.created_folders {
             // Fails for folders that are not empty, as intended.
             let _ = fs::remove_dir(folder);
         }
@@ -258,7 +262,7 @@ impl Drop for OutputLock {
 /// # Errors
 /// [`Error::Output`], [`Error::Busy`] when the other command still runs.
 pub fn recover(folder: &Path) -> Result<(), Error> {
-    if folder.join(COMPLETE).exists() {
+    if folder.join(COMPLETE_FOLDER).exists() {
         OutputLock::new(folder)?;
     }
     Ok(())
@@ -303,7 +307,7 @@ pub fn verify_manifest(folder: &Path, names: &[&str]) -> Result<(), Error> {
     };
     for name in names {
         let path = folder.join(name);
-        let found = sum_of_file(&path).ok();
+        let found = sha256_of_file(&path).ok();
         if manifest.sha256.get(*name) != found.as_ref() {
             return Err(Error::InconsistentSet { path: path.display().to_string() });
         }
@@ -341,8 +345,8 @@ fn failed(path: &Path, why: io::Error) -> Error {
 }
 
 /// Moves a complete set to its places; replaced files are kept until all are there.
-fn move_in(folder: &Path, killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
-    let (whole, old) = (folder.join(COMPLETE), folder.join(OLD));
+fn move_into_place(folder: &Path, killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
+    let (whole, old) = (folder.join(COMPLETE_FOLDER), folder.join(OLD_FOLDER));
     let names = names_in(&whole)?;
     check_killed(killed)?;
     fs::create_dir(&old)
@@ -374,33 +378,33 @@ fn names_in(whole: &Path) -> io::Result<Vec<String>> {
     Ok(names)
 }
 
-/// Undoes [`move_in`] for a set of these names. Until the last rename a kill leaves the new set.
+/// Undoes [`move_into_place`] for a set of these names. Until the last rename a kill leaves the new set.
 fn restore_old<'a>(folder: &Path, names: impl Iterator<Item = &'a str>) -> io::Result<()> {
-    let whole = folder.join(COMPLETE);
+    let whole = folder.join(COMPLETE_FOLDER);
     // Before the manifests are moved.
-    let superseded = superseded_files(folder, &whole, &folder.join(OLD));
+    let superseded = superseded_files(folder, &whole, &folder.join(OLD_FOLDER));
     for name in names {
         let (place, new) = (folder.join(name), whole.join(name));
         if !new.exists() && place.exists() {
             fs::rename(&place, &new)?;
         }
-        put_back(folder, name)?;
+        restore_file(folder, name)?;
     }
     for name in &superseded {
-        put_back(folder, name)?;
+        restore_file(folder, name)?;
     }
-    fs::rename(&whole, folder.join(NEW))
+    fs::rename(&whole, folder.join(STAGING_FOLDER))
 }
 
 /// Moves a file of the old set back to its place.
-fn put_back(folder: &Path, name: &str) -> io::Result<()> {
-    let aside = folder.join(OLD).join(name);
+fn restore_file(folder: &Path, name: &str) -> io::Result<()> {
+    let aside = folder.join(OLD_FOLDER).join(name);
     if aside.exists() { fs::rename(&aside, folder.join(name)) } else { Ok(()) }
 }
 
 /// Removes the staging folders.
 fn remove_staging(folder: &Path, killed: &mut dyn FnMut() -> bool) -> io::Result<()> {
-    for name in [NEW, COMPLETE, OLD] {
+    for name in [STAGING_FOLDER, COMPLETE_FOLDER, OLD_FOLDER] {
         check_killed(killed)?;
         fs::remove_dir_all(folder.join(name)).or_else(ignore_not_found)?;
     }

@@ -65,7 +65,7 @@ pub fn run_all_shards(
     present: &(dyn Fn(u64) + Sync),
     done: &(dyn Fn(u64) + Sync),
 ) -> Result<DiskTrialTable, Error> {
-    let mut all = Gathered::new(columns, out)?;
+    let mut all = ShardRowCollector::new(columns, out)?;
     for shard in 1..=of {
         let number = ShardNumber { shard, of };
         if number.path(out).exists() {
@@ -82,28 +82,28 @@ pub fn run_all_shards(
 }
 
 /// A failure after which finished shards remain in the folder.
-fn shards_kept(out: &Path, why: std::io::Error) -> Error {
+fn kept_shards_error(out: &Path, why: std::io::Error) -> Error {
     shard::ShardError::Write { path: out.display().to_string(), why }.into()
 }
 
 /// Collects the rows of the shards in order.
-struct Gathered<'a> {
+struct ShardRowCollector<'a> {
     out: &'a Path,
     rows: TrialTableWriter,
 }
 
-impl<'a> Gathered<'a> {
+impl<'a> ShardRowCollector<'a> {
     fn new(columns: &Columns, out: &'a Path) -> Result<Self, Error> {
-        let rows = TrialTableWriter::new(out, columns).map_err(|why| shards_kept(out, why))?;
+        let rows = TrialTableWriter::new(out, columns).map_err(|why| kept_shards_error(out, why))?;
         Ok(Self { out, rows })
     }
 
     fn take(&mut self, rows: &[TrialRow]) -> Result<(), Error> {
-        rows.iter().try_for_each(|row| self.rows.push(row)).map_err(|why| shards_kept(self.out, why))
+        rows.iter().try_for_each(|row| self.rows.push(row)).map_err(|why| kept_shards_error(self.out, why))
     }
 
     fn finish(self) -> Result<DiskTrialTable, Error> {
-        self.rows.finish().map_err(|why| shards_kept(self.out, why))
+        self.rows.finish().map_err(|why| kept_shards_error(self.out, why))
     }
 }
 
@@ -132,7 +132,7 @@ pub fn run_shard(
 /// [`Error::Request`] when one is missing or of another sweep.
 pub fn read_all_shards(sweep: &Sweep, columns: &Columns, out: &Path) -> Result<DiskTrialTable, Error> {
     let of = shard::shard_count(out)?;
-    let mut all = Gathered::new(columns, out)?;
+    let mut all = ShardRowCollector::new(columns, out)?;
     for shard in 1..=of {
         all.take(&shard::read(sweep, columns, ShardNumber { shard, of }, out)?)?;
     }
@@ -153,7 +153,7 @@ pub fn write_results(
     let written = write_result_files(sweep, columns, rows, lock)
         .and_then(|(output, summary)| output.with_inputs(inputs).write_locked(lock).map(|()| summary));
     let summary = written.map_err(|error| match error {
-        Error::Output { why, .. } => shards_kept(out, why),
+        Error::Output { why, .. } => kept_shards_error(out, why),
         other => other,
     })?;
     shard::remove_all(out);

@@ -30,7 +30,7 @@ fn insertion(forces_n: [f64; 2], dry_n_per_m: f64, effects: &str) -> Scenario {
     Scenario::parse("dry.ron", &text).expect("a scenario")
 }
 
-fn drawn(seed: u64) -> Simulation {
+fn simulated(seed: u64) -> Simulation {
     // What differs between insertions: layers that are a little tougher, friction that holds a little more.
     let of = |k: u64, size: f64| 1.0 + size * ((seed * k) % 7) as f64 / 6.0 - 0.5 * size;
     let scenario = insertion([1.2 * of(3, 0.2), 1.5 * of(5, 0.2)], 30.0 * of(2, 0.2), "");
@@ -66,8 +66,8 @@ fn with_a_law_fitted_elsewhere_the_enhanced_force_is_nearer_to_the_tips() -> Res
     let config = EnhancerConfigFile::default();
     let (mut without, mut with, mut own) = ([0.0; 3], [0.0; 3], [0.0; 3]);
     for seed in 1..=12 {
-        let drawn = drawn(seed);
-        let r = &drawn.recording;
+        let simulated = simulated(seed);
+        let r = &simulated.recording;
         let alone = enhance(r, &config).trace;
         let with_model = enhance_with_model(r, &config, &law)?.trace;
         assert_eq!(with_model.detections, alone.detections, "a model does not change the detections");
@@ -79,7 +79,7 @@ fn with_a_law_fitted_elsewhere_the_enhanced_force_is_nearer_to_the_tips() -> Res
                 (&mut with, &with_model.enhanced_n),
                 (&mut own, &replayed),
             ] {
-                sum[part] += off_n(&drawn, trace, from_s, to_s) / 12.0;
+                sum[part] += off_n(&simulated, trace, from_s, to_s) / 12.0;
             }
         }
     }
@@ -100,9 +100,9 @@ fn with_a_law_fitted_elsewhere_the_enhanced_force_is_nearer_to_the_tips() -> Res
 }
 
 #[test]
-fn what_is_said_of_a_sample_does_not_depend_on_later_ones() -> Result<(), Error> {
+fn the_output_of_a_sample_does_not_depend_on_later_ones() -> Result<(), Error> {
     let law = IdentifiedModel::new("extended.ron", &fitted())?;
-    let whole = drawn(1).recording;
+    let whole = simulated(1).recording;
     let with_model = enhance_with_model(&whole, &EnhancerConfigFile::default(), &law)?.trace;
     for samples in [1500, 2500, 3300] {
         let mut begin = whole.clone();
@@ -123,7 +123,7 @@ fn friction_is_given_as_the_sensor_shows_it() -> Result<(), Error> {
     let through = ", ForceGain(eps: 0.5), TimeDelay(delay_s: 0.1), ForceBias(force_n: 7.0)";
     let plain = IdentifiedModel::new("plain.ron", &fitted())?;
     let seen = IdentifiedModel::new("seen.ron", &insertion([1.2, 1.5], 30.0, through))?;
-    let r = drawn(1).recording;
+    let r = simulated(1).recording;
     let (mut plain, mut seen) = (plain.shaft_friction(r.sample_hz()), seen.shaft_friction(r.sample_hz()));
     let mut both = Vec::new();
     for s in r.samples() {
@@ -141,8 +141,9 @@ fn friction_is_given_as_the_sensor_shows_it() -> Result<(), Error> {
 }
 
 #[test]
-fn a_law_is_refused_by_algorithms_that_take_none_and_doubted_where_it_does_not_belong() -> Result<(), Error> {
-    let r = drawn(1).recording;
+fn a_model_is_refused_by_algorithms_without_models_and_warned_about_where_it_does_not_match()
+-> Result<(), Error> {
+    let r = simulated(1).recording;
     let law = IdentifiedModel::new("extended.ron", &fitted())?;
     let paper = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::paper() };
     let config = EnhancerConfigFile { enhance: paper, ..EnhancerConfigFile::default() };

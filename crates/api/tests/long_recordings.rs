@@ -156,7 +156,7 @@ fn a_recording_that_a_page_can_draw_gives_the_same_files_from_disk_and_from_memo
 }
 
 #[test]
-fn a_longer_one_gives_the_same_tables_and_a_report_that_says_what_it_shows() -> Result<(), Error> {
+fn a_longer_recording_gives_the_same_tables_and_a_report_that_states_what_it_shows() -> Result<(), Error> {
     let paper = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::paper() };
     compare_outputs(
         "long",

@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use stylet_api::benchmark::{OnlineExport, Player, judge_online, replay_streams};
+use stylet_api::benchmark::{OnlineExport, TestedDetector, replay_streams, score_online};
 use stylet_core::config::Algorithm;
 
 /// A folder of its own, removed afterwards.
@@ -107,7 +107,7 @@ fn without_the_feature_parquet_is_refused_with_its_name() {
 }
 
 #[test]
-fn recordings_are_judged_by_the_falls_of_their_force_in_a_row_of_their_own() {
+fn recordings_are_scored_by_the_falls_of_their_force_in_a_separate_row() {
     let scratch = Scratch::new("measured");
     scratch.write("run_1.csv", &recording());
     scratch.write("run_2.csv", &recording());
@@ -134,8 +134,8 @@ fn recordings_are_judged_by_the_falls_of_their_force_in_a_row_of_their_own() {
     }
     let answers = scratch.write("answers/events.csv", &events).parent().map(Path::to_owned).unwrap();
     let stylet = scratch.0.join("stylet");
-    replay_streams(&folder, &Player::Core(Algorithm::Stylet), "Stylet", &stylet, 1, &|| {}).unwrap();
-    let scores = judge_online(&folder, &[answers, stylet]).unwrap();
+    replay_streams(&folder, &TestedDetector::Core(Algorithm::Stylet), "Stylet", &stylet, 1, &|| {}).unwrap();
+    let scores = score_online(&folder, &[answers, stylet]).unwrap();
     for score in &scores {
         assert_eq!(score.rows.iter().map(|r| r.row.as_str()).collect::<Vec<_>>(), ["hold", "measured"]);
         let row = &score.rows[1];

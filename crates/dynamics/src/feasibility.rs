@@ -113,8 +113,8 @@ pub fn follow_line<const N: usize>(
     for &x in to_m {
         check("to_m", None, x, true, "")?;
     }
-    let way = to_m - from.position_m;
-    let length_m = way.norm();
+    let displacement_m = to_m - from.position_m;
+    let length_m = displacement_m.norm();
     let pieces = libm::ceil(length_m / spacing_m);
     check("spacing_m", None, spacing_m, pieces <= 1e6, "at least a millionth of the line's length")?;
     let pieces = pieces as u32;
@@ -122,8 +122,9 @@ pub fn follow_line<const N: usize>(
     let mut found: Option<FeasibleLine<N>> = None;
     for k in 0..=pieces {
         let fraction = if pieces == 0 { 0.0 } else { f64::from(k) / f64::from(pieces) };
-        let target = Pose { rotation: from.rotation, position_m: from.position_m + way * fraction };
-        let step = point(arm, &target, &way, near_rad, found.as_ref(), config);
+        let target =
+            Pose { rotation: from.rotation, position_m: from.position_m + displacement_m * fraction };
+        let step = point(arm, &target, &displacement_m, near_rad, found.as_ref(), config);
         found = Some(step.map_err(|reason| Error::Line {
             distance_m: fraction * length_m,
             length_m,
@@ -137,7 +138,7 @@ pub fn follow_line<const N: usize>(
 fn point<const N: usize>(
     arm: &Arm<N>,
     target: &Pose,
-    way: &Vector3<f64>,
+    displacement_m: &Vector3<f64>,
     near_rad: &JointVector<N>,
     before: Option<&FeasibleLine<N>>,
     config: &LineConfig,
@@ -158,8 +159,8 @@ fn point<const N: usize>(
     }
     let at = arm.at(&q);
     let smallest = check_not_singular(&at, config.min_singular_value)?;
-    if way.norm() > 0.0 {
-        let v = way * (config.speed_mps / way.norm());
+    if displacement_m.norm() > 0.0 {
+        let v = displacement_m * (config.speed_mps / displacement_m.norm());
         check_joint_velocities(arm, &at.joint_rates(&Vector6::new(v.x, v.y, v.z, 0.0, 0.0, 0.0), 0.0))?;
     }
     let margin = arm

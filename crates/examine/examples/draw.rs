@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Processor time (s) of this process so far; zero where the system does not tell.
+/// Processor time (s) of this process so far; zero where the system does not report it.
 fn processor_s() -> f64 {
     const TICK_HZ: f64 = 100.0;
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();

@@ -59,7 +59,7 @@ fn main() {
     let terms = [(0.2, 0.4), (0.25, 4.0)];
     let runs: Vec<(&str, Option<Vec<Effect>>)> = vec![
         ("base", Some(vec![])),
-        ("rich, neutral", None),
+        ("rich, inactive", None),
         ("stress_relaxation", Some(vec![Effect::StressRelaxation { terms }])),
         ("presliding_friction", Some(vec![Effect::PreslidingFriction { c_n_per_m: 6.0, delta_m: 8e-4 }])),
         ("rate_dependent_puncture", Some(vec![Effect::RateDependentPuncture { alpha: 0.15 }])),
@@ -72,14 +72,14 @@ fn main() {
                 Some(effects) => Box::new(PlainWorld::new(&tissue, effects)),
                 None => Box::new(RichWorld::new(&tissue, &RichEffects::default())),
             };
-            let there = simulate_insertion(law.as_mut(), &SensorModel::new(&[], 0.0), None, &path, &at, STEP_S);
+            let insertion = simulate_insertion(law.as_mut(), &SensorModel::new(&[], 0.0), None, &path, &at, STEP_S);
             let numbers: serde_json::Map<String, serde_json::Value> = effects
                 .iter()
                 .flatten()
                 .flat_map(Effect::parameters)
                 .map(|(path, value)| (path, json!(value)))
                 .collect();
-            json!({"name": name, "numbers": numbers, "force_n": there.force_n, "ruptures_s": there.ruptures_s})
+            json!({"name": name, "numbers": numbers, "force_n": insertion.force_n, "ruptures_s": insertion.ruptures_s})
         })
         .collect();
     println!(

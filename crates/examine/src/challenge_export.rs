@@ -37,8 +37,8 @@ pub enum ChallengeError {
         why: io::Error,
     },
     /// The folder exists already.
-    #[error("{0} is there already: name a folder that is not, or remove it")]
-    There(String),
+    #[error("{0} exists already; choose a new folder, or remove it")]
+    FolderExists(String),
     /// A file has the wrong content.
     #[error("{path}: {why}")]
     Content {
@@ -47,7 +47,7 @@ pub enum ChallengeError {
         /// Error and expected content.
         why: String,
     },
-    /// A case cannot be drawn.
+    /// A case cannot be generated.
     #[error(transparent)]
     Record(#[from] stylet_record::RecordError),
 }
@@ -65,7 +65,7 @@ pub fn key_path(folder: &Path) -> PathBuf {
 /// # Errors [`ChallengeError`]; partial output is removed.
 pub fn export(plan: &Plan, folder: &Path) -> Result<usize, ChallengeError> {
     if folder.exists() {
-        return Err(ChallengeError::There(folder.display().to_string()));
+        return Err(ChallengeError::FolderExists(folder.display().to_string()));
     }
     let mut part = folder.as_os_str().to_owned();
     part.push(".part");
@@ -80,7 +80,7 @@ pub fn export(plan: &Plan, folder: &Path) -> Result<usize, ChallengeError> {
     let numbered: Vec<(String, CaseId)> =
         cases.into_iter().enumerate().map(|(k, id)| (format!("{:04}", k + 1), id)).collect();
     let written: Result<Vec<()>, ChallengeError> =
-        numbered.par_iter().map(|(number, id)| one(&part.join("cases").join(number), id)).collect();
+        numbered.par_iter().map(|(number, id)| write_case(&part.join("cases").join(number), id)).collect();
     let finish = || -> Result<(), ChallengeError> {
         written?;
         std::fs::write(part.join("README.md"), readme(numbered.len())).map_err(failed)?;
@@ -98,7 +98,7 @@ pub fn export(plan: &Plan, folder: &Path) -> Result<usize, ChallengeError> {
     result.map(|()| numbered.len())
 }
 
-fn one(folder: &Path, id: &CaseId) -> Result<(), ChallengeError> {
+fn write_case(folder: &Path, id: &CaseId) -> Result<(), ChallengeError> {
     let failed = |why| ChallengeError::File { path: folder.display().to_string(), why };
     std::fs::create_dir_all(folder).map_err(failed)?;
     let case = make_case(id)?;

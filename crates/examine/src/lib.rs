@@ -17,12 +17,12 @@
 pub mod cases;
 pub mod challenge_export;
 pub mod examination_plan;
+mod named_enum;
 pub mod online;
 pub mod run_cases;
 pub mod scoring;
 pub mod simulator;
 pub mod success_rate;
-mod words;
 
 pub use cases::case_id::{CaseId, Hide, Severity, Size, World, Wrong};
 pub use cases::case_recordings::{Case, NamedFile, Question, make_case, make_case_with};

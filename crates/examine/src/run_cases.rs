@@ -24,7 +24,7 @@ pub enum RunError {
         why: std::io::Error,
     },
     /// A case could not be generated.
-    #[error("case {name} cannot be drawn: {why}")]
+    #[error("case {name} cannot be generated: {why}")]
     Draw {
         /// Case.
         name: String,

@@ -4,7 +4,7 @@
 use stylet_examine::{Hide, Plan, challenge_export};
 
 #[test]
-fn a_challenge_is_written_without_the_truth_and_answers_to_it_are_judged() {
+fn a_challenge_is_written_without_the_truth_and_answers_to_it_are_scored() {
     let folder = std::env::temp_dir().join(format!("stylet-challenge-{}", std::process::id()));
     let key = challenge_export::key_path(&folder);
     let plan = Plan { hide: vec![Hide::Clean, Hide::One], cases: 4, seed: 5, ..Plan::default() };
@@ -14,7 +14,7 @@ fn a_challenge_is_written_without_the_truth_and_answers_to_it_are_judged() {
     let csv = std::fs::read_to_string(folder.join("cases/0001/1.csv")).expect("1.csv");
     assert!(csv.starts_with("time_s,position_m,force_n\n"));
     assert!(std::fs::read_to_string(folder.join("names.txt")).expect("names").contains("coulomb_friction"));
-    // Nothing inside tells which case is which.
+    // No file reveals the case behind a number.
     for entry in std::fs::read_dir(&folder).expect("folder") {
         let name = entry.expect("entry").file_name().into_string().expect("a name");
         assert!(["README.md", "names.txt", "cases"].contains(&name.as_str()), "{name}");
@@ -30,7 +30,7 @@ fn a_challenge_is_written_without_the_truth_and_answers_to_it_are_judged() {
     assert_eq!(outcomes.len(), 4);
     assert_eq!(outcomes.iter().filter(|o| o.failed.is_some()).count(), 1);
     for o in outcomes.iter().filter(|o| o.failed.is_none() && o.id.hide == Hide::Clean) {
-        assert!(o.worth.correct);
+        assert!(o.score.correct);
     }
 
     std::fs::write(&answers, r#"{"0007":{"verdict":"none"}}"#).expect("answers");

@@ -8,7 +8,7 @@ const ALLOWED: [&str; 2] = ["stylet-record", "stylet-stats"];
 const LOCK: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../Cargo.lock");
 
 #[test]
-fn the_referee_depends_on_none_of_the_engines() {
+fn the_independent_simulator_does_not_depend_on_the_crates_it_tests() {
     // The lock file knows every kind of dependency, on every platform: normal, build and those of the tests.
     let text = std::fs::read_to_string(LOCK).expect("Cargo.lock");
     let lock: toml::Table = text.parse().expect("TOML");

@@ -74,9 +74,9 @@ fn the_rich_law_with_nothing_in_it_is_the_plain_law() {
     assert!(off < 1e-9 * largest(&plain.force_n), "{off}");
 }
 
-/// Not absent, but as good as neutral: what the ingredients do goes to nothing with their numbers.
+/// Effects that are present but nearly inactive: their contribution vanishes with their parameters.
 #[test]
-fn nearly_neutral_ingredients_leave_the_plain_force_within_a_thousandth() {
+fn nearly_inactive_effects_leave_the_plain_force_within_a_thousandth() {
     let nearly = RichEffects {
         bristles: Some(Bristles { share: 1.0, delta_m: 1e-7, dry_mps: 0.0, creep_s: f64::INFINITY }),
         foundation: Some(Foundation { softness: 1e-5, lag_s: 0.1 }),
@@ -174,7 +174,7 @@ fn a_rupture_by_force_comes_where_the_page_says() {
     };
     let path = MotionPath::new(-0.004, vec![MotionPiece::constant(0.004, 8.0)]);
     let at: Vec<f64> = (0..1600).map(|k| k as f64 / 200.0).collect();
-    let there = simulate_insertion(
+    let insertion = simulate_insertion(
         &mut PlainWorld::new(&one, &[]),
         &SensorModel::new(&[], 0.0),
         None,
@@ -183,8 +183,8 @@ fn a_rupture_by_force_comes_where_the_page_says() {
         2e-4,
     );
     // At 20 mm: 1 s in air and 5 s in tissue.
-    assert!((there.ruptures_s[0] - 6.0).abs() < 1e-8);
-    let force = |t: f64| there.force_n[(t * 200.0) as usize];
+    assert!((insertion.ruptures_s[0] - 6.0).abs() < 1e-8);
+    let force = |t: f64| insertion.force_n[(t * 200.0) as usize];
     assert!((force(3.0) - (50.0 * 0.008 + 10_000.0 * 0.008 * 0.004)).abs() < 1e-12);
     assert!((force(7.0) - 10_000.0 * 0.024 * 0.004).abs() < 1e-12);
 }

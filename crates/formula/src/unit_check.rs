@@ -41,15 +41,15 @@ impl Dimension {
 }
 
 /// State of the unit check of a formula. Every `Dimension` in `equal_to_none` must have no unit.
-pub(crate) struct Walk<'a> {
+pub(crate) struct UnitCheck<'a> {
     pub inputs: &'a [Dimension],
     pub equal_to_none: Vec<Dimension>,
 }
 
 /// The dimension of a part; `None` for zero, which fits every unit.
-pub(crate) type Found = Result<Option<Dimension>, FormulaError>;
+pub(crate) type PartDimension = Result<Option<Dimension>, FormulaError>;
 
-impl Walk<'_> {
+impl UnitCheck<'_> {
     /// Requires two dimensions to be equal; `problem` explains what is wrong if they are not.
     pub fn same(
         &mut self,
@@ -57,7 +57,7 @@ impl Walk<'_> {
         b: Option<Dimension>,
         place: (usize, usize),
         problem: impl FnOnce(Unit, Unit) -> alloc::string::String,
-    ) -> Found {
+    ) -> PartDimension {
         let (Some(left), Some(right)) = (a, b) else { return Ok(a.or(b)) };
         let ratio = left.combine(right, -1.0);
         if !ratio.is_known() {
@@ -68,7 +68,7 @@ impl Walk<'_> {
         Ok(Some(left))
     }
 
-    pub fn of(&mut self, node: &Node) -> Found {
+    pub fn of(&mut self, node: &Node) -> PartDimension {
         let (function, arguments) = match &node.kind {
             NodeKind::Number(x) => return Ok((*x != 0.0).then_some(Dimension::NONE)),
             NodeKind::Input(k) => return Ok(Some(self.inputs.get(*k).copied().unwrap_or(Dimension::NONE))),
@@ -134,7 +134,7 @@ impl Walk<'_> {
         }
     }
 
-    fn power(&mut self, base: Option<Dimension>, base_node: &Node, exponent: &Node) -> Found {
+    fn power(&mut self, base: Option<Dimension>, base_node: &Node, exponent: &Node) -> PartDimension {
         let of_exponent = self.of(exponent)?;
         self.same(of_exponent, Some(Dimension::NONE), exponent.place, |found, _| {
             format!("an exponent must have no unit, and this has {found}")
@@ -172,7 +172,7 @@ pub(crate) fn dimensions(inputs: &[Unit]) -> Vec<Dimension> {
 /// The unit of a formula for inputs with these units.
 pub(crate) fn unit_of(tree: &Node, inputs: &[Unit]) -> Result<Option<Unit>, FormulaError> {
     let inputs = dimensions(inputs);
-    let mut walk = Walk { inputs: &inputs, equal_to_none: Vec::new() };
+    let mut walk = UnitCheck { inputs: &inputs, equal_to_none: Vec::new() };
     Ok(walk.of(tree)?.map(|found| found.unit))
 }
 

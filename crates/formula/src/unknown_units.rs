@@ -3,7 +3,7 @@
 use crate::formula::Formula;
 use crate::formula_error::FormulaError;
 use crate::unit::Unit;
-use crate::unit_check::{Dimension, MAX_UNKNOWN, Walk, dimensions};
+use crate::unit_check::{Dimension, MAX_UNKNOWN, UnitCheck, dimensions};
 use alloc::format;
 use alloc::vec::Vec;
 
@@ -28,7 +28,7 @@ pub fn solve_unknown_units(
         };
         let mut inputs = dimensions(known);
         inputs.extend((0..solved.len()).map(of_state));
-        let mut walk = Walk { inputs: &inputs, equal_to_none: Vec::new() };
+        let mut walk = UnitCheck { inputs: &inputs, equal_to_none: Vec::new() };
         for (index, (formula, unit, state)) in required.iter().enumerate() {
             let found = walk.of(formula.tree()).map_err(|e| Some((index, e)))?;
             let expected = state.map_or(Dimension::NONE, of_state).combine(Dimension::known(*unit), 1.0);

@@ -76,14 +76,14 @@ impl InformationState {
         base: Model,
         candidates: Vec<Candidate>,
         unknown_n: Option<f64>,
-        old: &[BlockAverages],
+        recordings: &[BlockAverages],
         noise: Noise,
         sample_hz: f64,
     ) -> Option<Self> {
         let mut base = base;
-        let scatter_assumed =
-            old.len() < MIN_RECORDINGS_FOR_SCATTER && base.scatter.rupture_force <= DEFAULT_FORCE_SCATTER;
-        if old.len() < MIN_RECORDINGS_FOR_SCATTER {
+        let scatter_assumed = recordings.len() < MIN_RECORDINGS_FOR_SCATTER
+            && base.scatter.rupture_force <= DEFAULT_FORCE_SCATTER;
+        if recordings.len() < MIN_RECORDINGS_FOR_SCATTER {
             base.scatter.rupture_force = base.scatter.rupture_force.max(DEFAULT_FORCE_SCATTER);
             base.scatter.rupture_depth_m = base.scatter.rupture_depth_m.max(DEFAULT_DEPTH_SCATTER_M);
         }
@@ -105,8 +105,8 @@ impl InformationState {
         {
             before.add(i, i, 1.0 / (n.prior_sd * n.prior_sd));
         }
-        if !old.is_empty() {
-            let data = FitData::new(Arc::new(old.to_vec()), state.noise.clone(), 0.0);
+        if !recordings.is_empty() {
+            let data = FitData::new(Arc::new(recordings.to_vec()), state.noise.clone(), 0.0);
             before = add(&before, &state.information_of(&state.base, data)?);
         }
         state.prior_information = before;

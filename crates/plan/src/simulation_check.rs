@@ -49,13 +49,13 @@ pub fn check_by_simulation(
     limits: &Limits,
     assumed: &Scenario,
     state: &InformationState,
-    old: &[NamedRecording],
+    available_recordings: &[NamedRecording],
     mut progress: impl FnMut(&str),
 ) -> Result<Plan, PlanError> {
     let check = SimulationCheck {
         assumed,
         information: state,
-        recordings: old,
+        recordings: available_recordings,
         noise_n: sensor_noise(state, assumed),
     };
     let mut order: Vec<usize> = (0..state.candidates.len()).collect();

@@ -140,14 +140,15 @@ pub fn from_recordings(
 /// [`PlanError::NoForce`] when the model cannot be replayed along the motion.
 pub fn from_scenario(
     scenario: &Scenario,
-    made: Option<&Motion>,
+    motion: Option<&Motion>,
 ) -> Result<(InformationState, StartConditions), PlanError> {
-    let made = made.unwrap_or(&scenario.motion);
-    let recording = motion_to_recording(made, scenario.sample_hz);
+    let motion = motion.unwrap_or(&scenario.motion);
+    let recording = motion_to_recording(motion, scenario.sample_hz);
     let start = recording.as_ref().and_then(|r| r.position_m.first().copied());
-    let old: Vec<BlockAverages> = recording.iter().map(|r| BlockAverages::new(r, &[], BLOCK_S)).collect();
-    let mut base = Model::base(Arc::new(assumptions_of(scenario)), old.len().max(1));
-    for (r, b) in old.iter().enumerate() {
+    let recordings: Vec<BlockAverages> =
+        recording.iter().map(|r| BlockAverages::new(r, &[], BLOCK_S)).collect();
+    let mut base = Model::base(Arc::new(assumptions_of(scenario)), recordings.len().max(1));
+    for (r, b) in recordings.iter().enumerate() {
         let compiled = base.compile(r).ok_or_else(PlanError::no_force)?;
         base.rupture_times_s[r] = free_rupture_times(&compiled, &motion_pieces(&compiled, b));
     }
@@ -157,9 +158,15 @@ pub fn from_scenario(
     let each = OTHER_EFFECTS_PROBABILITY / terms.len().max(1) as f64;
     let mut candidates = vec![Candidate::without_effect(1.0 - OTHER_EFFECTS_PROBABILITY)];
     candidates.extend(terms.into_iter().map(|c| Candidate::with_effect(c, each)));
-    let state =
-        InformationState::new(base, candidates, None, &old, sensor_noise(scenario), scenario.sample_hz)
-            .ok_or_else(PlanError::no_force)?;
+    let state = InformationState::new(
+        base,
+        candidates,
+        None,
+        &recordings,
+        sensor_noise(scenario),
+        scenario.sample_hz,
+    )
+    .ok_or_else(PlanError::no_force)?;
     Ok((state, start_conditions(scenario, start)))
 }
 

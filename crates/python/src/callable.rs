@@ -1,6 +1,6 @@
 //! Custom effects whose equation is Python code.
 
-use crate::work::start_calling_threads;
+use crate::background_work::start_calling_threads;
 use crate::{StyletError, failure};
 use pyo3::exceptions::{PyArithmeticError, PyAttributeError, PyRuntimeWarning, PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -15,10 +15,10 @@ use stylet::tissue::{AnyEffect, Custom, CustomText, Equation, EquationSample, Pl
 static CALLS: Mutex<()> = Mutex::new(());
 
 /// What callables raised since the last report, by the name of the effect.
-static RAISED: Mutex<BTreeMap<String, Raised>> = Mutex::new(BTreeMap::new());
+static CALLABLE_EXCEPTIONS: Mutex<BTreeMap<String, CallableExceptions>> = Mutex::new(BTreeMap::new());
 
 /// Exceptions of one effect.
-struct Raised {
+struct CallableExceptions {
     first: PyErr,
     calls: usize,
 }
@@ -114,7 +114,10 @@ impl PythonEquation {
         // An interpreter that is ending takes no calls, and nobody waits for the result.
         let result = Python::try_attach(|py| {
             self.call(py, function, sample, parameters, states).unwrap_or_else(|first| {
-                raised(py).entry(self.effect.clone()).or_insert(Raised { first, calls: 0 }).calls += 1;
+                callable_exceptions(py)
+                    .entry(self.effect.clone())
+                    .or_insert(CallableExceptions { first, calls: 0 })
+                    .calls += 1;
                 f64::NAN
             })
         });
@@ -123,7 +126,7 @@ impl PythonEquation {
 
     /// Calls everything once with zeros in the sample: what is misspelt shows at once. Errors of arithmetic need not concern
     /// other samples.
-    fn try_out(&self, py: Python<'_>, parameters: &[f64]) -> PyResult<()> {
+    fn call_once_with_zeros(&self, py: Python<'_>, parameters: &[f64]) -> PyResult<()> {
         let states = vec![0.0; self.states.len()];
         for function in std::iter::once(&self.force).chain(&self.rates) {
             let result = self.call(py, function, &EquationSample::default(), parameters, &states);
@@ -185,21 +188,22 @@ pub fn define_effect(
         Some(force) => {
             let equation = PythonEquation::new(&text, force, rates);
             let start: Vec<f64> = text.parameters.0.iter().map(|(_, p)| p.start).collect();
-            equation.try_out(py, &start)?;
+            equation.call_once_with_zeros(py, &start)?;
             py.detach(start_calling_threads).map_err(failure)?;
             py.detach(|| Custom::define(&text, Box::new(equation)))
         }
     };
     // The definition has tried samples at which the equation may have no value.
-    drop(raised(py).remove(&text.name));
+    drop(callable_exceptions(py).remove(&text.name));
     effect.map(|effect| CustomEffect { effect: effect.into() }).map_err(failure)
 }
 
 /// The result of work that may have called callables. What they raised is the cause of an error, otherwise a warning.
 pub fn with_exceptions<T>(py: Python<'_>, result: PyResult<T>) -> PyResult<T> {
-    let raised = std::mem::take(&mut *raised(py));
-    let text =
-        |(effect, r): (&String, &Raised)| format!("effect `{effect}` raised {} ({} calls)", r.first, r.calls);
+    let raised = std::mem::take(&mut *callable_exceptions(py));
+    let text = |(effect, r): (&String, &CallableExceptions)| {
+        format!("effect `{effect}` raised {} ({} calls)", r.first, r.calls)
+    };
     let Some(first) = raised.values().next() else { return result };
     let all = raised.iter().map(text).collect::<Vec<_>>().join("; ");
     match result {
@@ -217,9 +221,9 @@ pub fn with_exceptions<T>(py: Python<'_>, result: PyResult<T>) -> PyResult<T> {
     }
 }
 
-/// [`RAISED`], for one statement.
-fn raised(py: Python<'_>) -> MutexGuard<'static, BTreeMap<String, Raised>> {
-    RAISED.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
+/// [`CALLABLE_EXCEPTIONS`], for one statement.
+fn callable_exceptions(py: Python<'_>) -> MutexGuard<'static, BTreeMap<String, CallableExceptions>> {
+    CALLABLE_EXCEPTIONS.lock_py_attached(py).unwrap_or_else(PoisonError::into_inner)
 }
 
 /// An error of the package with an exception as its cause.

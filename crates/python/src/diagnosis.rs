@@ -1,10 +1,10 @@
 //! Diagnosis of measured recordings.
 
 use crate::arrays::{Column, recording};
+use crate::background_work::run_in_background;
 use crate::callable::with_exceptions;
 use crate::failure;
 use crate::run::{CheckedScenario, ScenarioSource};
-use crate::work::run_in_background;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use std::path::PathBuf;

@@ -3,13 +3,13 @@
 #![forbid(unsafe_code)]
 
 mod arrays;
+mod background_work;
 mod callable;
 mod diagnosis;
 mod enhancer;
 mod plan;
 mod run;
 mod sweep;
-mod work;
 
 use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;

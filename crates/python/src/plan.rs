@@ -1,10 +1,10 @@
 //! Planning of the next insertion.
 
+use crate::background_work::run_in_background;
 use crate::callable::with_exceptions;
 use crate::diagnosis::{Measured, to_recordings};
 use crate::failure;
 use crate::run::ScenarioSource;
-use crate::work::run_in_background;
 use pyo3::prelude::*;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};

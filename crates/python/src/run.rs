@@ -1,9 +1,9 @@
 //! Simulated insertions and recordings read from files.
 
 use crate::arrays::insert_columns;
+use crate::background_work::run_in_background;
 use crate::callable::{CustomEffect, with_exceptions};
 use crate::failure;
-use crate::work::run_in_background;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -1,9 +1,9 @@
 //! Sweeps: insertions with random parameters.
 
+use crate::background_work::run_in_background;
 use crate::callable::with_exceptions;
 use crate::failure;
 use crate::run::ScenarioSource;
-use crate::work::run_in_background;
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -111,7 +111,7 @@ pub(crate) fn unit_notes(mapped: &MappedColumns) -> Vec<QualityNote> {
 }
 
 /// The note on rows without a value; the first of them begin at `offsets`.
-pub(crate) fn hole_note(
+pub(crate) fn missing_values_note(
     file: &SourceFile<'_>,
     count: usize,
     offsets: Vec<usize>,
@@ -197,7 +197,7 @@ impl Table {
             }
         };
         let mut table = Self { time_s, base_s, quantities, offsets, notes };
-        table.fill_holes(file, &mapped, &read)?;
+        table.remove_missing_values(file, &mapped, &read)?;
         Ok(table)
     }
 
@@ -214,7 +214,7 @@ impl Table {
     }
 
     /// Leaves out rows without a value; where rows of different topics alternate, interpolates on the stamps of the force.
-    fn fill_holes(
+    fn remove_missing_values(
         &mut self,
         file: &SourceFile<'_>,
         mapped: &MappedColumns,
@@ -246,11 +246,11 @@ impl Table {
         }
         let left = complete.iter().filter(|complete| **complete).count();
         if left < MIN_ROWS {
-            return Err(first_hole(file, mapped, read)?);
+            return Err(first_missing_value(file, mapped, read)?);
         }
         let dropped =
             self.offsets.iter().zip(&complete).filter(|(_, complete)| !**complete).map(|(offset, _)| *offset);
-        self.notes.push(hole_note(file, rows - left, dropped.take(MAX_LINES).collect())?);
+        self.notes.push(missing_values_note(file, rows - left, dropped.take(MAX_LINES).collect())?);
         self.retain(&complete);
         Ok(())
     }
@@ -464,7 +464,7 @@ fn converted(
 }
 
 /// The error of the first missing value.
-fn first_hole(
+fn first_missing_value(
     file: &SourceFile<'_>,
     mapped: &MappedColumns,
     read: &RowsRead,

@@ -150,7 +150,7 @@ pub(crate) fn map_columns(
             let mut found = MappedColumns::default();
             let taken: Vec<usize> = wanted
                 .iter()
-                .filter_map(|(role, column)| given(head, *role, column).ok()?)
+                .filter_map(|(role, column)| mapped_by_user(head, *role, column).ok()?)
                 .flat_map(|c| c.indices)
                 .collect();
             for (role, column) in wanted {
@@ -159,10 +159,10 @@ pub(crate) fn map_columns(
                 {
                     continue;
                 }
-                let mapped = match given(head, role, column)? {
+                let mapped = match mapped_by_user(head, role, column)? {
                     Some(mapped) => mapped,
                     None => {
-                        let mut mapped = open(head, role, &taken)?;
+                        let mut mapped = find_by_name_and_unit(head, role, &taken)?;
                         mapped.scale = column.scale.unwrap_or(mapped.scale);
                         mapped.scale_is_given = column.scale.is_some();
                         mapped.offset = column.offset;
@@ -191,16 +191,16 @@ pub(crate) fn map_series(
     if map.rate_hz.is_none() || !map.time.is_open() {
         // The other file may name its time otherwise, and numbers of columns are those of the first file.
         let by_number = map.time.column.is_some() || !map.time.columns.is_empty();
-        let time = match given(head, ColumnRole::Time, &map.time) {
+        let time = match mapped_by_user(head, ColumnRole::Time, &map.time) {
             Ok(Some(time)) if !by_number => time,
-            _ => open(head, ColumnRole::Time, &[])?,
+            _ => find_by_name_and_unit(head, ColumnRole::Time, &[])?,
         };
         found.add(head, time);
     }
-    let column = match given(head, role, column)? {
+    let column = match mapped_by_user(head, role, column)? {
         Some(mapped) => mapped,
         None => {
-            let mapped = open(head, role, &[])?;
+            let mapped = find_by_name_and_unit(head, role, &[])?;
             MappedColumn { scale: column.scale.unwrap_or(mapped.scale), offset: column.offset, ..mapped }
         }
     };
@@ -217,10 +217,10 @@ pub(crate) fn find_role(
     role: ColumnRole,
     column: &Column,
 ) -> Result<MappedColumn, RecordError> {
-    match given(head, role, column)? {
+    match mapped_by_user(head, role, column)? {
         Some(mapped) => Ok(mapped),
         None => {
-            let mapped = open(head, role, &[])?;
+            let mapped = find_by_name_and_unit(head, role, &[])?;
             Ok(MappedColumn {
                 scale: column.scale.unwrap_or(mapped.scale),
                 scale_is_given: column.scale.is_some(),
@@ -298,7 +298,7 @@ fn mapped(head: TableHead<'_>, role: ColumnRole, indices: Vec<usize>, column: &C
 }
 
 /// The column that a map names; `None` when the map leaves it open.
-fn given(
+fn mapped_by_user(
     head: TableHead<'_>,
     role: ColumnRole,
     column: &Column,
@@ -319,7 +319,7 @@ fn given(
         indices.push(number - 1);
     }
     for name in names {
-        match place(head, name.trim())? {
+        match column_index(head, name.trim())? {
             Some(index) => indices.push(index),
             None => {
                 // `wrench` denotes `wrench.1`, `wrench.2`, `wrench.3`.
@@ -347,7 +347,7 @@ fn map_words(role: ColumnRole) -> &'static str {
 }
 
 /// The place of a name; an error when it occurs twice.
-fn place(head: TableHead<'_>, name: &str) -> Result<Option<usize>, RecordError> {
+fn column_index(head: TableHead<'_>, name: &str) -> Result<Option<usize>, RecordError> {
     let mut places = head.names.iter().enumerate().filter(|(_, existing)| existing.trim() == name);
     let found = places.next().map(|(index, _)| index);
     match places.next() {
@@ -372,7 +372,7 @@ pub(crate) fn missing(head: TableHead<'_>, column: &str, what: &'static str) -> 
     RecordError::MissingColumn {
         path: head.path.to_owned(),
         line: head.line,
-        suggestion: closest(column, head.names),
+        suggestion: most_similar_name(column, head.names),
         column: column.to_owned(),
         what,
         available: head.names.to_vec(),
@@ -383,11 +383,11 @@ pub(crate) fn missing(head: TableHead<'_>, column: &str, what: &'static str) -> 
 fn without_map(head: TableHead<'_>) -> Result<MappedColumns, RecordError> {
     let mut found = MappedColumns::default();
     for role in REQUIRED {
-        found.add(head, open(head, role, &[])?);
+        found.add(head, find_by_name_and_unit(head, role, &[])?);
     }
     found.check_clocks(head)?;
     let mut own = |role, name: &str| -> Result<bool, RecordError> {
-        let index = place(head, name)?;
+        let index = column_index(head, name)?;
         if let Some(index) = index {
             found.add(head, mapped(head, role, vec![index], &Column::si(name)));
         }
@@ -408,11 +408,17 @@ fn without_map(head: TableHead<'_>) -> Result<MappedColumns, RecordError> {
 }
 
 /// A column found by its name and unit. Columns in `taken` are already assigned.
-fn open(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Result<MappedColumn, RecordError> {
+fn find_by_name_and_unit(
+    head: TableHead<'_>,
+    role: ColumnRole,
+    taken: &[usize],
+) -> Result<MappedColumn, RecordError> {
     let (own, what) = role.own();
     let column = Column::default();
-    if let Some(index) = place(head, own)? {
-        return Ok(mapped(head, role, vec![index], &Column { scale: Some(1.0), ..column }).named_only());
+    if let Some(index) = column_index(head, own)? {
+        return Ok(
+            mapped(head, role, vec![index], &Column { scale: Some(1.0), ..column }).with_scale_of_name()
+        );
     }
     // Seconds and nanoseconds, as ROS prints them.
     let place_of = |part: &str| head.names.iter().position(|name| name == part);
@@ -421,7 +427,7 @@ fn open(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Result<Mapped
             return Ok(mapped(head, role, vec![s, ns], &column));
         }
     }
-    let found = unmistakable(head, role, taken);
+    let found = identified_by_name_and_unit(head, role, taken);
     match found.as_slice() {
         [index] => Ok(mapped(head, role, vec![*index], &column)),
         [] => Err(missing(head, own, what)),
@@ -444,14 +450,14 @@ fn open(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Result<Mapped
 
 impl MappedColumn {
     /// A scale that follows from the name, not from a map.
-    fn named_only(self) -> Self {
+    fn with_scale_of_name(self) -> Self {
         let scale_is_given = self.kind == ColumnKind::Date;
         Self { scale_is_given, ..self }
     }
 }
 
 /// Columns whose name and unit identify the quantity.
-fn unmistakable(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Vec<usize> {
+fn identified_by_name_and_unit(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Vec<usize> {
     let (own, _) = role.own();
     let free = || (0..head.names.len()).filter(|index| !taken.contains(index));
     // `/insertion.time_s`, as `stylet convert` writes MCAP.
@@ -477,32 +483,38 @@ fn unmistakable(head: TableHead<'_>, role: ColumnRole, taken: &[usize]) -> Vec<u
         .collect();
     let found = if by_name.is_empty() { with_unit.clone() } else { by_name };
     // Columns without any value, and commands beside measurements, are candidates only if all are.
-    let found = those_or_all(found, |index| kind(index) != ColumnKind::Empty);
-    let found = those_or_all(found, |index| !is_commanded(&head.names[index]));
+    let found = filter_or_all(found, |index| kind(index) != ColumnKind::Empty);
+    let found = filter_or_all(found, |index| !is_commanded(&head.names[index]));
     if let ([index], ColumnRole::Position | ColumnRole::Force) = (found.as_slice(), role) {
-        let rival =
-            with_unit.iter().copied().find(|other| other != index && is_rival(head, role, *index, *other));
+        let rival = with_unit
+            .iter()
+            .copied()
+            .find(|other| other != index && is_competing_column(head, role, *index, *other));
         return std::iter::once(*index).chain(rival).collect();
     }
     found
 }
 
 /// The columns for which `keep` holds; all if there is none.
-fn those_or_all(columns: Vec<usize>, keep: impl Fn(usize) -> bool) -> Vec<usize> {
+fn filter_or_all(columns: Vec<usize>, keep: impl Fn(usize) -> bool) -> Vec<usize> {
     let kept: Vec<usize> = columns.iter().copied().filter(|index| keep(*index)).collect();
     if kept.is_empty() { columns } else { kept }
 }
 
 /// Ratio of the ranges of two columns of one quantity from which the wider one may be meant although its name says less.
-const RIVAL_RANGE: f64 = 3.0;
+const COMPETING_RANGE_RATIO: f64 = 3.0;
 /// The same for components of a position: the motion is oblique to the axis that the name says.
-const OBLIQUE_RANGE: f64 = 0.3;
+const OBLIQUE_RANGE_RATIO: f64 = 0.3;
 
 /// Whether another column of the same quantity varies so much that the name alone does not decide.
-fn is_rival(head: TableHead<'_>, role: ColumnRole, index: usize, other: usize) -> bool {
+fn is_competing_column(head: TableHead<'_>, role: ColumnRole, index: usize, other: usize) -> bool {
     let vector = |index: usize| vector_of(&head.names[index]);
     let is_component = vector(index).is_some() && vector(index) == vector(other);
-    let factor = if is_component && role == ColumnRole::Position { OBLIQUE_RANGE } else { RIVAL_RANGE };
+    let factor = if is_component && role == ColumnRole::Position {
+        OBLIQUE_RANGE_RATIO
+    } else {
+        COMPETING_RANGE_RATIO
+    };
     let range = |index: usize| head.samples.get(index).map_or(f64::NAN, ColumnSample::range);
     range(other) > factor * range(index)
 }
@@ -543,7 +555,7 @@ pub(crate) fn joint_torque_name(joint: usize) -> String {
 }
 
 /// The most similar existing name, if any is close.
-fn closest(wanted: &str, names: &[String]) -> Option<String> {
+fn most_similar_name(wanted: &str, names: &[String]) -> Option<String> {
     let target = wanted.to_lowercase();
     let stem = target.rsplit_once('_').map_or(target.as_str(), |(stem, _unit)| stem);
     let max_distance = (target.chars().count() / 3).max(2);
@@ -588,11 +600,11 @@ mod tests {
 
     #[test]
     fn a_similar_name_is_suggested_and_a_different_one_is_not() {
-        assert_eq!(closest("time_s", &names("Time_s,fz")), Some("Time_s".to_owned()));
-        assert_eq!(closest("time_s", &names("timestamp_ns,fz")), Some("timestamp_ns".to_owned()));
-        assert_eq!(closest("position_m", &names("t,pos,fz")), Some("pos".to_owned()));
-        assert_eq!(closest("force_n", &names("fz,px,forse_n")), Some("forse_n".to_owned()));
-        assert_eq!(closest("force_n", &names("fz,px,py")), None);
+        assert_eq!(most_similar_name("time_s", &names("Time_s,fz")), Some("Time_s".to_owned()));
+        assert_eq!(most_similar_name("time_s", &names("timestamp_ns,fz")), Some("timestamp_ns".to_owned()));
+        assert_eq!(most_similar_name("position_m", &names("t,pos,fz")), Some("pos".to_owned()));
+        assert_eq!(most_similar_name("force_n", &names("fz,px,forse_n")), Some("forse_n".to_owned()));
+        assert_eq!(most_similar_name("force_n", &names("fz,px,py")), None);
     }
 
     #[test]

@@ -194,7 +194,7 @@ pub enum RecordError {
     BadMapField { field: &'static str, must_be: &'static str },
 
     /// An error with further obstacles and the command that helps.
-    #[error("{first}{}\nlook at the file with: stylet inspect {} --write-map map.ron", also(others), path.display())]
+    #[error("{first}{}\nlook at the file with: stylet inspect {} --write-map map.ron", further_obstacles(others), path.display())]
     Refused { first: Box<RecordError>, others: Vec<String>, path: PathBuf },
 
     /// Too short to have a velocity.
@@ -236,7 +236,7 @@ pub enum RecordError {
     /// Recordings with blocking quality notes.
     #[error(
         "{}{}\nlook at a file with: stylet inspect FILE --write-map map.ron",
-        unusable(*of, *recordings), wrong.join("\n")
+        refused_heading(*of, *recordings), wrong.join("\n")
     )]
     Unusable { of: usize, recordings: usize, wrong: Vec<String> },
 
@@ -273,7 +273,7 @@ pub enum RecordError {
 }
 
 /// Further obstacles, one per line.
-fn also(others: &[String]) -> String {
+fn further_obstacles(others: &[String]) -> String {
     let mut text = String::new();
     for (at, other) in others.iter().enumerate() {
         text.push_str(if at == 0 { "\nfurther obstacles:" } else { "" });
@@ -284,7 +284,7 @@ fn also(others: &[String]) -> String {
 }
 
 /// Introduction to the list of refused recordings; empty for a single one.
-fn unusable(of: usize, wrong: usize) -> String {
+fn refused_heading(of: usize, wrong: usize) -> String {
     if of == 1 {
         String::new()
     } else {

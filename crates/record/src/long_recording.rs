@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
-use crate::assemble::{check_sample_count, hole_note, unit_notes};
+use crate::assemble::{check_sample_count, missing_values_note, unit_notes};
 use crate::columns::{ColumnRole, MappedColumns, Parts, joint_torque_name};
 use crate::differentiate::{DEFAULT_HALF_WIDTH_S, SlopeFilter};
 use crate::disk_table::{BLOCK_ROWS, DiskTable, DiskTableWriter, ExternalSort};
@@ -248,7 +248,7 @@ impl LongRecording {
         }
         let mut notes = unit_notes(&columns);
         if holes > 0 {
-            notes.push(hole_note(&file_source, holes, hole_offsets)?);
+            notes.push(missing_values_note(&file_source, holes, hole_offsets)?);
         }
         let table = writer.finish().map_err(temporary_file_error)?;
         let (table, dropped_lines) = match options.repair && !in_order {

@@ -18,7 +18,7 @@ const MAX_START_SHARE: f64 = 0.2;
 const START_SAMPLES: usize = 20;
 
 /// [`inspect`](crate::inspect::inspect), and then the recording is read as a command would read it: with the map of `options`, or the proposed
-/// one if the file needs one. What the reader or the quality checks refuse becomes an obstacle. Where position or force run the other way, the proposed
+/// one if the file needs one. What the reader or the quality checks refuse becomes an obstacle. Where position or force have the opposite sign, the proposed
 /// map reverses their signs. Files above 32 MB are not read; a remark says so.
 ///
 /// # Errors

@@ -60,9 +60,9 @@ pub(crate) fn assess_stream<A: SampleStream>(recording: &A) -> Result<Vec<Qualit
     let dead = plausibility::dead_sensor(recording.len(), &extent);
     if dead.is_none() && notes.is_empty() {
         notes.extend(plausibility::reversed_force(recording)?);
-        notes.extend(plausibility::only_in_air(recording, &extent)?);
+        notes.extend(plausibility::only_in_air_note(recording, &extent)?);
         if notes.is_empty() && plausibility::no_motion(&extent).is_none() {
-            notes.extend(direction::without_insertion(recording, &extent)?);
+            notes.extend(direction::no_insertion_note(recording, &extent)?);
         }
     }
     notes.extend(dead);

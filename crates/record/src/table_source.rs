@@ -8,7 +8,7 @@ use encoding_rs::{Encoding, UTF_8};
 use crate::column_map::{Column, ColumnMap};
 use crate::columns::{ColumnRole, MappedColumns, map_columns, map_series};
 use crate::error::RecordError;
-use crate::file_formats::{FileFormat, Foreign};
+use crate::file_formats::{FileFormat, OpenFile};
 use crate::memory_limit::{self, read_limited};
 use crate::text::encoding;
 use crate::text::find::find_table;
@@ -78,9 +78,9 @@ pub(crate) fn with_table<T>(
     let series_map = select.series_map(map);
     let map = series_map.as_ref().or(map);
     match FileFormat::detect(bytes) {
-        Some(kind) => match Foreign::open(kind, bytes, path, map)? {
-            Foreign::Text(text) => with_text(&text, path, map, select, then),
-            Foreign::Columns(source) => {
+        Some(kind) => match OpenFile::open(kind, bytes, path, map)? {
+            OpenFile::Text(text) => with_text(&text, path, map, select, then),
+            OpenFile::Columns(source) => {
                 let (mapped, columns) = source.read(path, |head| match (select, map) {
                     (Select::Series(role, column), Some(map)) => map_series(head, map, role, column),
                     _ => map_columns(head, map),

@@ -349,7 +349,7 @@ pub(crate) fn is_commanded(name: &str) -> bool {
 }
 
 /// Whether a name denotes none of the quantities of a recording, such as a torque, a current or a counter.
-pub(crate) fn is_other(name: &str) -> bool {
+pub(crate) fn is_other_quantity(name: &str) -> bool {
     has_word(name, OTHER_WORDS) || (quantity_of(name).is_none() && has_word(name, FURTHER_OTHER_WORDS))
 }
 

@@ -132,7 +132,7 @@ fn a_unit_in_the_preamble_counts_less_than_one_in_a_name() {
 }
 
 #[test]
-fn a_measured_position_is_taken_beside_its_set_point() {
+fn a_measured_position_is_preferred_to_its_set_point() {
     let text = text("Time (s),Position setpoint (mm),Position (mm),Force (N)\n", |_, [t, z, f]| {
         format!("{t},{},{z},{f}", z + 0.4)
     });

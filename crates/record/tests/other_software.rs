@@ -85,7 +85,7 @@ fn every_file_of_other_software_gives_its_insertion() {
 }
 
 #[test]
-fn an_inspection_sees_time_position_and_force_in_every_file() {
+fn an_inspection_finds_time_position_and_force_in_every_file() {
     for (name, ..) in FILES {
         let found =
             inspect(file(name), &InspectOptions::default()).unwrap_or_else(|error| panic!("{name}: {error}"));

@@ -69,7 +69,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn what_is_written_is_read_back_bit_for_bit(recording in recordings(), with_truth: bool) {
+    fn written_recordings_are_read_back_bit_for_bit(recording in recordings(), with_truth: bool) {
         let truth = truth_for(recording.len());
         let extra = vec![f64::NAN; recording.len()];
         let bytes = written(&recording, with_truth.then_some(&truth), &[("estimate_n", &extra)])?;

@@ -1,7 +1,7 @@
 //! The data for the page's script as JSON: every column stored once, charts refer to columns by index.
 
 use crate::chart_model::{Chart, Scale, Series};
-use crate::decimate::{MAX_POINTS, kept_indices, pick};
+use crate::decimate::{MAX_POINTS, kept_indices, values_at};
 use crate::palette::Colour;
 use serde_json::{Map, Value, json};
 use std::borrow::Cow;
@@ -137,7 +137,7 @@ fn thin(chart: &Chart) -> Vec<(Column<'_>, Column<'_>)> {
         .series
         .iter()
         .map(|series| match thin_one(series) {
-            Some(kept) => (Cow::Owned(pick(&series.x, &kept)), Cow::Owned(pick(&series.y, &kept))),
+            Some(kept) => (Cow::Owned(values_at(&series.x, &kept)), Cow::Owned(values_at(&series.y, &kept))),
             None => {
                 let length = series.x.len().min(series.y.len());
                 (Cow::Borrowed(&series.x[..length]), Cow::Borrowed(&series.y[..length]))

@@ -46,7 +46,7 @@ fn keep_extremes(column: &[f64], from: usize, to: usize, kept: &mut Vec<usize>) 
 
 /// The values at the kept indices; a column too short for an index gives not-a-number there.
 #[must_use]
-pub fn pick(column: &[f64], kept: &[usize]) -> Vec<f64> {
+pub fn values_at(column: &[f64], kept: &[usize]) -> Vec<f64> {
     kept.iter().map(|&index| column.get(index).copied().unwrap_or(f64::NAN)).collect()
 }
 
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn single_sample_spikes_and_gaps_survive_thinning() {
+    fn single_sample_spikes_and_gaps_are_kept_by_thinning() {
         let mut force: Vec<f64> = (0..1_000_000).map(|i| f64::from(i % 100)).collect();
         force[123_457] = 1e6;
         force[765_432] = -1e6;
@@ -64,7 +64,7 @@ mod tests {
         let kept =
             kept_indices(&[&force, &quiet], force.len(), MAX_POINTS).expect("long enough to be thinned");
         assert!(kept.len() <= MAX_POINTS + 4, "{}", kept.len());
-        let thinned = pick(&force, &kept);
+        let thinned = values_at(&force, &kept);
         assert!(thinned.contains(&1e6) && thinned.contains(&-1e6));
         assert!(thinned.iter().any(|v| v.is_nan()));
         assert_eq!((kept.first(), kept.last()), (Some(&0), Some(&999_999)));

@@ -52,9 +52,9 @@ fn render(page: &Page) -> String {
         .filter_map(|block| if let Block::Chart(chart) = block { Some(chart) } else { None })
         .collect();
     let mut out = String::with_capacity(1 << 20);
-    head(&mut out, page);
+    render_head(&mut out, page);
     out.push_str("<body>\n");
-    masthead(&mut out, page);
+    render_page_header(&mut out, page);
     out.push_str("<main>\n");
     let mut chart_number = 0;
     for (index, section) in page.sections.iter().enumerate() {
@@ -80,7 +80,7 @@ fn render(page: &Page) -> String {
     out
 }
 
-fn head(out: &mut String, page: &Page) {
+fn render_head(out: &mut String, page: &Page) {
     let _ = write!(
         out,
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<script>{ERROR_TRAP}</script>\n\
@@ -92,7 +92,7 @@ fn head(out: &mut String, page: &Page) {
     );
 }
 
-fn masthead(out: &mut String, page: &Page) {
+fn render_page_header(out: &mut String, page: &Page) {
     let _ = writeln!(
         out,
         "<header>\n<p class=\"disclaimer\">{DISCLAIMER}</p>\n<h1>{}</h1>",

@@ -22,7 +22,7 @@ pub mod svg;
 pub mod vendored;
 
 pub use chart_model::{Band, Chart, Lane, Level, LineStyle, MarkerSet, Scale, Series, Side, Span};
-pub use decimate::{kept_indices, pick};
+pub use decimate::{kept_indices, values_at};
 pub use insertion_report::RunReport;
 pub use page_model::{Block, Cell, Code, Page, Section, Status, SvgImage, Table, Text, Tile};
 pub use palette::Colour;

@@ -3,48 +3,53 @@
 
 use crate::algorithm_variant::{Ablation, Sensor, Setup};
 use crate::all_runs::Study;
-use crate::effect_size::{Measured, Part, Scale};
+use crate::effect_size::{ExperimentValues, Measured, Scale};
 use crate::paper_experiments::Case;
 use crate::run_outcome::Outcome;
 use crate::seed_interval::Interval;
 use crate::seed_spread::Spread;
 use crate::study_conditions::View;
-use crate::value_source::Sourced;
+use crate::value_source::SourcedTable;
 use serde::Serialize;
 use stylet_report::{Cell, Section, Table, percent, significant};
 
 /// A compared variant of the algorithm.
-struct Way {
+struct ComparedVariant {
     name: &'static str,
     setup: Setup,
     ablation: Ablation,
     kelvin_voigt: bool,
 }
 
-const fn way(name: &'static str, setup: Setup, ablation: Ablation, kelvin_voigt: bool) -> Way {
-    Way { name, setup, ablation, kelvin_voigt }
+const fn variant(
+    name: &'static str,
+    setup: Setup,
+    ablation: Ablation,
+    kelvin_voigt: bool,
+) -> ComparedVariant {
+    ComparedVariant { name, setup, ablation, kelvin_voigt }
 }
 
-const WAYS: [Way; 11] = [
-    way("the primary condition", Setup::Tuned, Ablation::None, false),
-    way("to the letter (Literal)", Setup::Literal, Ablation::None, false),
-    way("derivative on drops (Drop)", Setup::FallingForce, Ablation::None, false),
-    way("no detection by the trailing edge", Setup::NoTrailingEdge, Ablation::None, false),
-    way("resets at 6.66 Hz", Setup::SlowReset, Ablation::None, false),
-    way("resets only at ruptures", Setup::Tuned, Ablation::OnlyRuptures, false),
-    way("no re-weighting", Setup::Tuned, Ablation::NoReweight, false),
-    way("depth and surface known", Setup::KnownDepth, Ablation::None, false),
-    way("Kelvin-Voigt", Setup::Tuned, Ablation::None, true),
-    way("Kelvin-Voigt, no re-weighting", Setup::Tuned, Ablation::NoReweight, true),
-    way("Kelvin-Voigt, resets only at ruptures", Setup::Tuned, Ablation::OnlyRuptures, true),
+const COMPARED_VARIANTS: [ComparedVariant; 11] = [
+    variant("the primary condition", Setup::Tuned, Ablation::None, false),
+    variant("to the letter (Literal)", Setup::Literal, Ablation::None, false),
+    variant("derivative on drops (Drop)", Setup::FallingForce, Ablation::None, false),
+    variant("no detection by the trailing edge", Setup::NoTrailingEdge, Ablation::None, false),
+    variant("resets at 6.66 Hz", Setup::SlowReset, Ablation::None, false),
+    variant("resets only at ruptures", Setup::Tuned, Ablation::OnlyRuptures, false),
+    variant("no re-weighting", Setup::Tuned, Ablation::NoReweight, false),
+    variant("depth and surface known", Setup::KnownDepth, Ablation::None, false),
+    variant("Kelvin-Voigt", Setup::Tuned, Ablation::None, true),
+    variant("Kelvin-Voigt, no re-weighting", Setup::Tuned, Ablation::NoReweight, true),
+    variant("Kelvin-Voigt, resets only at ruptures", Setup::Tuned, Ablation::OnlyRuptures, true),
 ];
 
 const CASES: [Case; 5] =
     [Case::Gel50Constant, Case::LatexConstant, Case::LatexSinusoidal, Case::Liver, Case::Abdomen];
 
-fn runs<'a>(study: &'a Study, case: Case, way: &Way) -> &'a [Outcome] {
-    let view = View::primary(study).setup(way.setup);
-    view.runs(case, Sensor::ForceTorque, way.kelvin_voigt, way.ablation)
+fn runs<'a>(study: &'a Study, case: Case, variant: &ComparedVariant) -> &'a [Outcome] {
+    let view = View::primary(study).setup(variant.setup);
+    view.runs(case, Sensor::ForceTorque, variant.kelvin_voigt, variant.ablation)
 }
 
 /// Median over the seeds of the relative errors of K, layer by layer.
@@ -73,11 +78,11 @@ pub struct Ablated {
     pub name: &'static str,
     /// Noise seeds.
     pub seeds: usize,
-    /// True ruptures over all seeds,
+    /// Number of true ruptures over all seeds.
     pub ruptures: usize,
-    /// missed of them,
+    /// Number of missed ruptures.
     pub missed: usize,
-    /// and false ones.
+    /// Number of false ruptures.
     pub false_alarms: usize,
     /// Median over the seeds of the relative error of K, layer by layer; `None` without an estimate.
     pub stiffness_error: Vec<Option<f64>>,
@@ -89,16 +94,16 @@ pub struct Ablated {
     pub reconstruction_rms_n: Option<Interval>,
 }
 
-fn ablated(study: &Study, case: Case, way: &Way) -> Ablated {
-    let runs = runs(study, case, way);
+fn ablated(study: &Study, case: Case, variant: &ComparedVariant) -> Ablated {
+    let runs = runs(study, case, variant);
     let sum = |of: fn(&Outcome) -> usize| runs.iter().map(of).sum::<usize>();
     let mean = |value: fn(&Outcome) -> Option<f64>| {
-        let parts = vec![Part::new("", runs.iter().map(value))];
+        let parts = vec![ExperimentValues::new("", runs.iter().map(value))];
         Measured { scale: Scale::Mean, parts }.effect().interval
     };
     Ablated {
         experiment: case.name(),
-        name: way.name,
+        name: variant.name,
         seeds: runs.len(),
         ruptures: sum(|o| o.score.ruptures.len()),
         missed: sum(|o| o.score.missed),
@@ -113,14 +118,17 @@ fn ablated(study: &Study, case: Case, way: &Way) -> Ablated {
 /// All variants on all experiments.
 #[must_use]
 pub fn record(study: &Study) -> Vec<Ablated> {
-    CASES.iter().flat_map(|case| WAYS.iter().map(|way| ablated(study, *case, way))).collect()
+    CASES
+        .iter()
+        .flat_map(|case| COMPARED_VARIANTS.iter().map(|variant| ablated(study, *case, variant)))
+        .collect()
 }
 
-fn table(study: &Study, case: Case) -> Sourced {
-    let rows = WAYS
+fn table(study: &Study, case: Case) -> SourcedTable {
+    let rows = COMPARED_VARIANTS
         .iter()
-        .map(|way| {
-            let found = ablated(study, case, way);
+        .map(|variant| {
+            let found = ablated(study, case, variant);
             let show = |interval: Option<Interval>, text: &dyn Fn(f64) -> String| {
                 Cell::number(interval.map_or("–".to_owned(), |i| {
                     format!("{} ({} to {})", text(i.value), text(i.low), text(i.high))
@@ -128,7 +136,7 @@ fn table(study: &Study, case: Case) -> Sourced {
             };
             let short = |x: f64| significant(x, 3);
             vec![
-                Cell::text(way.name),
+                Cell::text(variant.name),
                 Cell::number(format!("{} / {} of {}", found.missed, found.false_alarms, found.ruptures)),
                 Cell::number(percents(&found.stiffness_error)),
                 show(found.cumulative_ratio, &short),
@@ -137,7 +145,7 @@ fn table(study: &Study, case: Case) -> Sourced {
             ]
         })
         .collect();
-    Sourced::computed(Table {
+    SourcedTable::computed(Table {
         title: format!("{}: mean over {} seeds (95 % interval)", case.name(), study.seeds),
         headers: [
             "",
@@ -155,7 +163,7 @@ fn table(study: &Study, case: Case) -> Sourced {
 }
 
 /// K and b offline, with the drop's share as the online algorithm measured it, and without any drop.
-fn offline(study: &Study) -> Sourced {
+fn offline(study: &Study) -> SourcedTable {
     let view = View::primary(study);
     let mut rows = Vec::new();
     for case in CASES {
@@ -187,7 +195,7 @@ fn offline(study: &Study) -> Sourced {
             ]);
         }
     }
-    Sourced::computed(Table {
+    SourcedTable::computed(Table {
         title: "Offline least squares, off by (median); without the drop, elastic and viscous column weigh the same (eq. 17)".to_owned(),
         headers: [
             "",
@@ -205,15 +213,15 @@ fn offline(study: &Study) -> Sourced {
 }
 
 /// Kelvin-Voigt fitted by least squares over the whole layer attributes the local friction to K: the error is `b v / K`.
-fn kelvin_voigt(study: &Study) -> Sourced {
+fn kelvin_voigt(study: &Study) -> SourcedTable {
     let case = Case::LatexConstant;
     let rows = [
-        ("40 Hz, re-weighted", &WAYS[8]),
-        ("40 Hz, not re-weighted", &WAYS[9]),
-        ("no resets within a layer", &WAYS[10]),
+        ("40 Hz, re-weighted", &COMPARED_VARIANTS[8]),
+        ("40 Hz, not re-weighted", &COMPARED_VARIANTS[9]),
+        ("no resets within a layer", &COMPARED_VARIANTS[10]),
     ]
-    .map(|(name, way)| {
-        vec![Cell::text(name), Cell::number(percents(&stiffness_errors(runs(study, case, way))))]
+    .map(|(name, variant)| {
+        vec![Cell::text(name), Cell::number(percents(&stiffness_errors(runs(study, case, variant))))]
     });
     let predicted = case.scenario().map(|s| {
         let speed = match s.motion {
@@ -229,7 +237,7 @@ fn kelvin_voigt(study: &Study) -> Sourced {
     if let Ok(predicted) = predicted {
         rows.push(vec![Cell::text("b v / K"), Cell::number(predicted)]);
     }
-    Sourced::computed(Table {
+    SourcedTable::computed(Table {
         title: "Kelvin-Voigt on the latex stack, constant velocity".to_owned(),
         headers: ["", "K off by, %, layer by layer"].map(String::from).to_vec(),
         rows,

@@ -28,7 +28,7 @@ pub enum Setup {
     /// As `Tuned`, `s1` doubled.
     SigmaDoubled,
     /// The thresholds of the scenario; for the virtual sensor `s1 = 0.015 N`, an assumed value.
-    Own,
+    ScenarioThresholds,
 }
 
 /// Part of the algorithm that is left out.
@@ -83,7 +83,7 @@ impl Variant {
     /// Whether the detection must be tuned first.
     #[must_use]
     pub const fn is_tuned(self) -> bool {
-        !matches!(self.setup, Setup::Published | Setup::KnownDepth | Setup::Own)
+        !matches!(self.setup, Setup::Published | Setup::KnownDepth | Setup::ScenarioThresholds)
     }
 
     /// The configuration of the paper's algorithm for a sensor of a scenario.
@@ -95,14 +95,14 @@ impl Variant {
         };
         config.algorithm = Algorithm::Paper;
         config.model = if self.kelvin_voigt { Model::KelvinVoigt } else { Model::MultiLayer };
-        if self.setup != Setup::Own {
+        if self.setup != Setup::ScenarioThresholds {
             let published = Tuning::default();
             let chosen = if self.is_tuned() { tuning } else { &published };
             config.cusum.sigma_rupture_n = chosen.sigma_rupture_n;
             config.derivative.on_n_per_s = chosen.on_n_per_s;
         }
         match self.setup {
-            Setup::Tuned | Setup::Published | Setup::Own => {}
+            Setup::Tuned | Setup::Published | Setup::ScenarioThresholds => {}
             Setup::KnownDepth => {
                 config.contact = Contact::Known;
                 config.depths = Depths::Known(scenario.tissue.layers.iter().map(|l| l.thickness_m).collect());

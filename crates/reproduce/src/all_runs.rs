@@ -41,7 +41,7 @@ pub enum ReproduceError {
 
 /// Key of a recording: experiment, change of an assumed value if any, and noise of the force/torque sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Recorded {
+pub struct RecordingKey {
     /// Experiment.
     pub case: Case,
     /// The changed value, if any.
@@ -52,9 +52,9 @@ pub struct Recorded {
 
 /// Key of a run: recording, sensor, and variant of the algorithm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Key {
+pub struct RunKey {
     /// The recording.
-    pub recorded: Recorded,
+    pub recording_key: RecordingKey,
     /// Sensor.
     pub sensor: Sensor,
     /// Model and protocol.
@@ -63,9 +63,9 @@ pub struct Key {
 
 /// Lookups of a planning study, with their number of seeds.
 #[derive(Clone, Debug, Default)]
-struct Wanted {
-    runs: BTreeMap<Key, u64>,
-    offline: BTreeMap<Recorded, u64>,
+struct RequestedRuns {
+    runs: BTreeMap<RunKey, u64>,
+    offline: BTreeMap<RecordingKey, u64>,
 }
 
 /// The outcomes of every run, by seed.
@@ -75,10 +75,10 @@ pub struct Study {
     pub first_seed: u64,
     /// Number of noise seeds.
     pub seeds: u64,
-    runs: BTreeMap<Key, Vec<Outcome>>,
-    offline: BTreeMap<Recorded, Vec<Offline>>,
-    tunings: BTreeMap<(Recorded, Sensor), Tuning>,
-    wanted: Option<Mutex<Wanted>>,
+    runs: BTreeMap<RunKey, Vec<Outcome>>,
+    offline: BTreeMap<RecordingKey, Vec<Offline>>,
+    tunings: BTreeMap<(RecordingKey, Sensor), Tuning>,
+    requested: Option<Mutex<RequestedRuns>>,
 }
 
 /// Recordings that share one simulation, or on the arm the seeds' simulations.
@@ -86,18 +86,18 @@ type Group = (Case, Option<Change>);
 
 /// One recording of one seed, with all requested runs.
 struct Job<'a> {
-    recorded: Recorded,
-    once: &'a Insertion,
+    recording_key: RecordingKey,
+    insertion: &'a Insertion,
     seed: u64,
-    runs: Vec<Key>,
+    runs: Vec<RunKey>,
     offline: bool,
 }
 
 /// Result of a job.
 #[derive(Default)]
-struct Done {
-    runs: Vec<(Key, Outcome)>,
-    offline: Option<(Recorded, Offline)>,
+struct JobResult {
+    runs: Vec<(RunKey, Outcome)>,
+    offline: Option<(RecordingKey, Offline)>,
 }
 
 /// A plan: all requested runs.
@@ -105,32 +105,32 @@ struct Done {
 pub struct Plan {
     first_seed: u64,
     seeds: u64,
-    wanted: Wanted,
+    requested: RequestedRuns,
 }
 
 impl Plan {
     /// The recordings with their number of seeds, expensive ones first, so that all threads finish at about the same time.
-    fn recordings(&self) -> Vec<(Recorded, u64)> {
-        let mut all: BTreeMap<Recorded, u64> = self.wanted.offline.clone();
-        for (key, seeds) in &self.wanted.runs {
-            let most = all.entry(key.recorded).or_default();
+    fn recordings(&self) -> Vec<(RecordingKey, u64)> {
+        let mut all: BTreeMap<RecordingKey, u64> = self.requested.offline.clone();
+        for (key, seeds) in &self.requested.runs {
+            let most = all.entry(key.recording_key).or_default();
             *most = (*most).max(*seeds);
         }
-        let mut list: Vec<(Recorded, u64)> = all.into_iter().collect();
+        let mut list: Vec<(RecordingKey, u64)> = all.into_iter().collect();
         list.sort_by_key(|(r, _)| (!r.case.on_arm(), !r.case.is_liver()));
         list
     }
 
     /// Number of recordings over all seeds, for progress.
     #[must_use]
-    pub fn recordings_in_all(&self) -> u64 {
+    pub fn recording_count(&self) -> u64 {
         self.recordings().iter().map(|(_, seeds)| seeds).sum()
     }
 
     /// Number of runs of the algorithm over all seeds, without those of the tuning.
     #[must_use]
-    pub fn runs_in_all(&self) -> u64 {
-        self.wanted.runs.values().sum()
+    pub fn run_count(&self) -> u64 {
+        self.requested.runs.values().sum()
     }
 
     fn insertions(&self) -> Result<BTreeMap<Group, Insertion>, ReproduceError> {
@@ -149,10 +149,10 @@ impl Plan {
     }
 
     /// The required tunings by sensor, and whether the threshold of the triggered reset is tuned too.
-    fn to_tune(&self) -> BTreeMap<Recorded, BTreeMap<Sensor, bool>> {
-        let mut all: BTreeMap<Recorded, BTreeMap<Sensor, bool>> = BTreeMap::new();
-        for key in self.wanted.runs.keys().filter(|k| k.variant.is_tuned()) {
-            let sensors = all.entry(unchanged_on_arm(key.recorded)).or_default();
+    fn required_tunings(&self) -> BTreeMap<RecordingKey, BTreeMap<Sensor, bool>> {
+        let mut all: BTreeMap<RecordingKey, BTreeMap<Sensor, bool>> = BTreeMap::new();
+        for key in self.requested.runs.keys().filter(|k| k.variant.is_tuned()) {
+            let sensors = all.entry(unchanged_on_arm(key.recording_key)).or_default();
             *sensors.entry(key.sensor).or_default() |= key.variant.ablation == Ablation::Trace;
         }
         all
@@ -160,90 +160,93 @@ impl Plan {
 }
 
 /// On the arm a changed phantom is run with the tuning of the unchanged one.
-fn unchanged_on_arm(recorded: Recorded) -> Recorded {
-    if recorded.case.on_arm() { Recorded { change: None, ..recorded } } else { recorded }
+fn unchanged_on_arm(recording_key: RecordingKey) -> RecordingKey {
+    if recording_key.case.on_arm() { RecordingKey { change: None, ..recording_key } } else { recording_key }
 }
 
 impl Study {
     /// A planning study: without runs, it records the lookups.
     #[must_use]
-    pub fn asking(first_seed: u64, seeds: u64) -> Self {
-        Self { first_seed, seeds, wanted: Some(Mutex::default()), ..Self::default() }
+    pub fn planning(first_seed: u64, seeds: u64) -> Self {
+        Self { first_seed, seeds, requested: Some(Mutex::default()), ..Self::default() }
     }
 
     /// Whether this is a planning study.
     #[must_use]
-    pub const fn is_asking(&self) -> bool {
-        self.wanted.is_some()
+    pub const fn is_planning(&self) -> bool {
+        self.requested.is_some()
     }
 
-    /// The lookups of a study made by [`Study::asking`].
+    /// The lookups of a study made by [`Study::planning`].
     #[must_use]
     pub fn plan(self) -> Plan {
-        let wanted = self.wanted.and_then(|w| w.into_inner().ok()).unwrap_or_default();
-        Plan { first_seed: self.first_seed, seeds: self.seeds, wanted }
+        let requested = self.requested.and_then(|w| w.into_inner().ok()).unwrap_or_default();
+        Plan { first_seed: self.first_seed, seeds: self.seeds, requested }
     }
 
-    /// Runs everything in a plan; `done` is called once for each of [`Plan::recordings_in_all`], from any
+    /// Runs everything in a plan; `done` is called once for each of [`Plan::recording_count`], from any
     /// thread. The result does not depend on the number of threads.
     ///
     /// # Errors
     /// [`ReproduceError`] when a shipped scenario is wrong.
     pub fn run(plan: &Plan, done: &(dyn Fn() + Sync)) -> Result<Self, ReproduceError> {
         let insertions = plan.insertions()?;
-        let missing = |r: &Recorded| ReproduceError::NotRun(r.case.name().to_owned());
+        let missing = |r: &RecordingKey| ReproduceError::NotRun(r.case.name().to_owned());
         let tunings: Vec<Vec<Tuned>> = plan
-            .to_tune()
+            .required_tunings()
             .into_par_iter()
-            .map(|(recorded, sensors)| {
-                let once = insertions.get(&(recorded.case, recorded.change));
-                tune(recorded, once.ok_or_else(|| missing(&recorded))?, &sensors)
+            .map(|(recording_key, sensors)| {
+                let insertion = insertions.get(&(recording_key.case, recording_key.change));
+                tune(recording_key, insertion.ok_or_else(|| missing(&recording_key))?, &sensors)
             })
             .collect::<Result<_, _>>()?;
-        let tunings: BTreeMap<(Recorded, Sensor), Tuning> = tunings.into_iter().flatten().collect();
+        let tunings: BTreeMap<(RecordingKey, Sensor), Tuning> = tunings.into_iter().flatten().collect();
         let mut jobs = Vec::new();
-        for (recorded, seeds) in plan.recordings() {
-            let once = insertions.get(&(recorded.case, recorded.change)).ok_or_else(|| missing(&recorded))?;
+        for (recording_key, seeds) in plan.recordings() {
+            let insertion = insertions
+                .get(&(recording_key.case, recording_key.change))
+                .ok_or_else(|| missing(&recording_key))?;
             for index in 0..seeds {
                 let wants = |most: &u64| *most > index;
-                let runs = plan.wanted.runs.iter().filter(|(k, n)| k.recorded == recorded && wants(n));
+                let runs =
+                    plan.requested.runs.iter().filter(|(k, n)| k.recording_key == recording_key && wants(n));
                 jobs.push(Job {
-                    recorded,
-                    once,
+                    recording_key,
+                    insertion,
                     seed: plan.first_seed + index,
                     runs: runs.map(|(k, _)| *k).collect(),
-                    offline: plan.wanted.offline.get(&recorded).is_some_and(wants),
+                    offline: plan.requested.offline.get(&recording_key).is_some_and(wants),
                 });
             }
         }
         let first = plan.first_seed;
-        let outcomes: Vec<Done> = jobs
+        let outcomes: Vec<JobResult> = jobs
             .into_par_iter()
             .map(|job| {
-                let found = one(&job, first, &tunings);
+                let found = run_job(&job, first, &tunings);
                 done();
                 found
             })
             .collect::<Result<_, _>>()?;
-        let mut runs: BTreeMap<Key, Vec<Outcome>> = BTreeMap::new();
-        let mut offline: BTreeMap<Recorded, Vec<Offline>> = BTreeMap::new();
+        let mut runs: BTreeMap<RunKey, Vec<Outcome>> = BTreeMap::new();
+        let mut offline: BTreeMap<RecordingKey, Vec<Offline>> = BTreeMap::new();
         for done in outcomes {
             for (key, outcome) in done.runs {
                 runs.entry(key).or_default().push(outcome);
             }
-            if let Some((recorded, found)) = done.offline {
-                offline.entry(recorded).or_default().push(found);
+            if let Some((recording_key, found)) = done.offline {
+                offline.entry(recording_key).or_default().push(found);
             }
         }
-        Ok(Self { first_seed: first, seeds: plan.seeds, runs, offline, tunings, wanted: None })
+        Ok(Self { first_seed: first, seeds: plan.seeds, runs, offline, tunings, requested: None })
     }
 
     /// The outcomes of one combination, by seed, at most `seeds` of them; recorded in a planning study.
     #[must_use]
-    pub fn runs(&self, key: Key, seeds: u64) -> &[Outcome] {
+    pub fn runs(&self, key: RunKey, seeds: u64) -> &[Outcome] {
         let seeds = seeds.min(self.seeds);
-        if let Some(mut wanted) = self.wanted.as_ref().and_then(|w| w.lock().ok()) {
-            let most = wanted.runs.entry(key).or_default();
+        if let Some(mut requested) = self.requested.as_ref().and_then(|w| w.lock().ok()) {
+            let most = requested.runs.entry(key).or_default();
             *most = (*most).max(seeds);
         }
         let all = self.runs.get(&key).map_or(&[][..], Vec::as_slice);
@@ -252,53 +255,53 @@ impl Study {
 
     /// The offline estimates of a recording, as [`Study::runs`].
     #[must_use]
-    pub fn offline(&self, recorded: Recorded, seeds: u64) -> &[Offline] {
+    pub fn offline(&self, recording_key: RecordingKey, seeds: u64) -> &[Offline] {
         let seeds = seeds.min(self.seeds);
-        if let Some(mut wanted) = self.wanted.as_ref().and_then(|w| w.lock().ok()) {
-            let most = wanted.offline.entry(recorded).or_default();
+        if let Some(mut requested) = self.requested.as_ref().and_then(|w| w.lock().ok()) {
+            let most = requested.offline.entry(recording_key).or_default();
             *most = (*most).max(seeds);
         }
-        let all = self.offline.get(&recorded).map_or(&[][..], Vec::as_slice);
+        let all = self.offline.get(&recording_key).map_or(&[][..], Vec::as_slice);
         &all[..all.len().min(seeds as usize)]
     }
 
     /// The tuned thresholds of a phantom; the published defaults if it was not tuned.
     #[must_use]
-    pub fn tuning(&self, recorded: Recorded, sensor: Sensor) -> Tuning {
-        self.tunings.get(&(unchanged_on_arm(recorded), sensor)).copied().unwrap_or_default()
+    pub fn tuning(&self, recording_key: RecordingKey, sensor: Sensor) -> Tuning {
+        self.tunings.get(&(unchanged_on_arm(recording_key), sensor)).copied().unwrap_or_default()
     }
 
     /// All tunings.
-    pub fn tunings(&self) -> impl Iterator<Item = (&(Recorded, Sensor), &Tuning)> {
+    pub fn tunings(&self) -> impl Iterator<Item = (&(RecordingKey, Sensor), &Tuning)> {
         self.tunings.iter()
     }
 }
 
 /// Tuned recordings with their thresholds.
-type Tuned = ((Recorded, Sensor), Tuning);
+type Tuned = ((RecordingKey, Sensor), Tuning);
 
 /// The tunings of a recording; on the arm one simulation of each tuning seed serves every sensor.
 fn tune(
-    recorded: Recorded,
-    once: &Insertion,
+    recording_key: RecordingKey,
+    insertion: &Insertion,
     sensors: &BTreeMap<Sensor, bool>,
 ) -> Result<Vec<Tuned>, ReproduceError> {
-    let on_arm = recorded.case.on_arm();
+    let on_arm = recording_key.case.on_arm();
     let seeds: Vec<u64> = (0..if on_arm { TUNING_SEEDS_ARM } else { TUNING_SEEDS })
         .map(|index| TUNING_FIRST_SEED + index)
         .collect();
     let made: Vec<Insertion> = if on_arm {
-        seeds.par_iter().map(|seed| Insertion::of(&once.scenario, *seed)).collect::<Result<_, _>>()?
+        seeds.par_iter().map(|seed| Insertion::of(&insertion.scenario, *seed)).collect::<Result<_, _>>()?
     } else {
         Vec::new()
     };
     let of = |sensor: Sensor, trace: bool| {
         let recording = |(index, seed): (usize, &u64)| {
-            let insertion = made.get(index).unwrap_or(once);
-            (insertion, samples_of(insertion, *seed, recorded.noise_mn, sensor))
+            let insertion = made.get(index).unwrap_or(insertion);
+            (insertion, samples_of(insertion, *seed, recording_key.noise_mn, sensor))
         };
         let recordings: Vec<_> = seeds.iter().enumerate().map(recording).collect();
-        ((recorded, sensor), Tuning::of(&recordings, sensor, trace))
+        ((recording_key, sensor), Tuning::of(&recordings, sensor, trace))
     };
     Ok(sensors.iter().map(|(sensor, trace)| of(*sensor, *trace)).collect())
 }
@@ -310,29 +313,29 @@ fn samples_of(insertion: &Insertion, seed: u64, noise_mn: u32, sensor: Sensor) -
     }
 }
 
-fn one(
+fn run_job(
     job: &Job<'_>,
     first_seed: u64,
-    tunings: &BTreeMap<(Recorded, Sensor), Tuning>,
-) -> Result<Done, ReproduceError> {
-    let mut done = Done::default();
+    tunings: &BTreeMap<(RecordingKey, Sensor), Tuning>,
+) -> Result<JobResult, ReproduceError> {
+    let mut done = JobResult::default();
     // On the arm the torque noise moves the needle, so each seed is a separate insertion.
     let fresh;
-    let insertion = if job.recorded.case.on_arm() && job.seed != first_seed {
-        fresh = Insertion::of(&job.once.scenario, job.seed)?;
+    let insertion = if job.recording_key.case.on_arm() && job.seed != first_seed {
+        fresh = Insertion::of(&job.insertion.scenario, job.seed)?;
         &fresh
     } else {
-        job.once
+        job.insertion
     };
     for sensor in [Sensor::ForceTorque, Sensor::Virtual] {
-        let asked = job.runs.iter().filter(|k| k.sensor == sensor);
-        if !(job.offline && sensor == Sensor::ForceTorque) && asked.clone().next().is_none() {
+        let runs_of_sensor = job.runs.iter().filter(|k| k.sensor == sensor);
+        if !(job.offline && sensor == Sensor::ForceTorque) && runs_of_sensor.clone().next().is_none() {
             continue;
         }
-        let samples = samples_of(insertion, job.seed, job.recorded.noise_mn, sensor);
-        let tuning = tunings.get(&(unchanged_on_arm(job.recorded), sensor)).copied().unwrap_or_default();
+        let samples = samples_of(insertion, job.seed, job.recording_key.noise_mn, sensor);
+        let tuning = tunings.get(&(unchanged_on_arm(job.recording_key), sensor)).copied().unwrap_or_default();
         let mut shares = Vec::new();
-        for key in asked {
+        for key in runs_of_sensor {
             let outcome = insertion.run(&samples, sensor, key.variant, &tuning);
             if key.variant == Variant::ml(Setup::Tuned) {
                 shares.clone_from(&outcome.shares);
@@ -340,7 +343,7 @@ fn one(
             done.runs.push((*key, outcome));
         }
         if job.offline && sensor == Sensor::ForceTorque {
-            done.offline = Some((job.recorded, Offline::of(insertion, &samples, &shares)));
+            done.offline = Some((job.recording_key, Offline::of(insertion, &samples, &shares)));
         }
     }
     Ok(done)

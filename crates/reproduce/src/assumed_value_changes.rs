@@ -6,7 +6,7 @@ use stylet_scenario::{Motion, Scenario, Sensor};
 
 /// A value that the paper does not give: assumed, or taken from another source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Number {
+pub enum AssumedValue {
     /// Noise of the force/torque sensor.
     Noise,
     /// K of the three single gels.
@@ -20,7 +20,7 @@ pub enum Number {
     /// b of the stack's three layers.
     StackFriction,
     /// Puncture force of the latex.
-    Latex,
+    LatexPuncture,
     /// K of both layers of the liver.
     LiverStiffness,
     /// b of both layers of the liver.
@@ -34,9 +34,9 @@ pub enum Number {
     /// b of the abdomen's three layers.
     AbdomenFriction,
     /// Travel in air between start and contact.
-    Start,
+    TravelInAir,
     /// Duration of the motion after the target is passed.
-    Behind,
+    TimeBehindTarget,
     /// Noise of the arm's joint torques.
     TorqueNoise,
     /// `s1` for the virtual sensor.
@@ -47,7 +47,7 @@ pub enum Number {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Change {
     /// The assumed value.
-    pub number: Number,
+    pub value: AssumedValue,
     /// Doubled instead of halved.
     pub doubled: bool,
 }
@@ -58,56 +58,56 @@ impl Serialize for Change {
     }
 }
 
-impl Number {
+impl AssumedValue {
     /// All.
-    pub const ALL: [Number; 17] = [
-        Number::Noise,
-        Number::GelStiffness,
-        Number::GelFriction,
-        Number::GelContrast,
-        Number::StackStiffness,
-        Number::StackFriction,
-        Number::Latex,
-        Number::LiverStiffness,
-        Number::LiverFriction,
-        Number::LiverPuncture,
-        Number::LiverThickness,
-        Number::AbdomenStiffness,
-        Number::AbdomenFriction,
-        Number::Start,
-        Number::Behind,
-        Number::TorqueNoise,
-        Number::VirtualSigma,
+    pub const ALL: [AssumedValue; 17] = [
+        AssumedValue::Noise,
+        AssumedValue::GelStiffness,
+        AssumedValue::GelFriction,
+        AssumedValue::GelContrast,
+        AssumedValue::StackStiffness,
+        AssumedValue::StackFriction,
+        AssumedValue::LatexPuncture,
+        AssumedValue::LiverStiffness,
+        AssumedValue::LiverFriction,
+        AssumedValue::LiverPuncture,
+        AssumedValue::LiverThickness,
+        AssumedValue::AbdomenStiffness,
+        AssumedValue::AbdomenFriction,
+        AssumedValue::TravelInAir,
+        AssumedValue::TimeBehindTarget,
+        AssumedValue::TorqueNoise,
+        AssumedValue::VirtualSigma,
     ];
 
     /// Name as in the protocols.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
-            Number::Noise => "noise of the force sensor",
-            Number::GelStiffness => "K of the single gels",
-            Number::GelFriction => "b of the single gels",
-            Number::GelContrast => "contrast of b between the single gels",
-            Number::StackStiffness => "K of the stack",
-            Number::StackFriction => "b of the stack",
-            Number::Latex => "puncture force of the latex",
-            Number::LiverStiffness => "K of the liver",
-            Number::LiverFriction => "b of the liver",
-            Number::LiverPuncture => "puncture forces of the liver",
-            Number::LiverThickness => "thicknesses of the liver",
-            Number::AbdomenStiffness => "K of the abdomen",
-            Number::AbdomenFriction => "b of the abdomen",
-            Number::Start => "way in air before contact",
-            Number::Behind => "time behind the target",
-            Number::TorqueNoise => "noise of the joint torques",
-            Number::VirtualSigma => "s1 for the virtual sensor",
+            AssumedValue::Noise => "noise of the force sensor",
+            AssumedValue::GelStiffness => "K of the single gels",
+            AssumedValue::GelFriction => "b of the single gels",
+            AssumedValue::GelContrast => "contrast of b between the single gels",
+            AssumedValue::StackStiffness => "K of the stack",
+            AssumedValue::StackFriction => "b of the stack",
+            AssumedValue::LatexPuncture => "puncture force of the latex",
+            AssumedValue::LiverStiffness => "K of the liver",
+            AssumedValue::LiverFriction => "b of the liver",
+            AssumedValue::LiverPuncture => "puncture forces of the liver",
+            AssumedValue::LiverThickness => "thicknesses of the liver",
+            AssumedValue::AbdomenStiffness => "K of the abdomen",
+            AssumedValue::AbdomenFriction => "b of the abdomen",
+            AssumedValue::TravelInAir => "way in air before contact",
+            AssumedValue::TimeBehindTarget => "time behind the target",
+            AssumedValue::TorqueNoise => "noise of the joint torques",
+            AssumedValue::VirtualSigma => "s1 for the virtual sensor",
         }
     }
 
     /// Halved and doubled.
     #[must_use]
     pub const fn changes(self) -> [Change; 2] {
-        [Change { number: self, doubled: false }, Change { number: self, doubled: true }]
+        [Change { value: self, doubled: false }, Change { value: self, doubled: true }]
     }
 
     /// Whether the value affects a recording. The noise of the force/torque sensor is a separate key, and `s1` belongs to
@@ -115,18 +115,22 @@ impl Number {
     #[must_use]
     pub const fn enters(self, case: Case) -> bool {
         match self {
-            Number::Noise | Number::VirtualSigma => false,
-            Number::GelStiffness | Number::GelFriction | Number::GelContrast => case.is_gel(),
-            Number::StackStiffness | Number::StackFriction | Number::Latex => case.is_stack(),
-            Number::LiverStiffness
-            | Number::LiverFriction
-            | Number::LiverPuncture
-            | Number::LiverThickness => case.is_liver(),
-            Number::AbdomenStiffness | Number::AbdomenFriction => case.is_abdomen(),
-            Number::Start => true,
+            AssumedValue::Noise | AssumedValue::VirtualSigma => false,
+            AssumedValue::GelStiffness | AssumedValue::GelFriction | AssumedValue::GelContrast => {
+                case.is_gel()
+            }
+            AssumedValue::StackStiffness | AssumedValue::StackFriction | AssumedValue::LatexPuncture => {
+                case.is_stack()
+            }
+            AssumedValue::LiverStiffness
+            | AssumedValue::LiverFriction
+            | AssumedValue::LiverPuncture
+            | AssumedValue::LiverThickness => case.is_liver(),
+            AssumedValue::AbdomenStiffness | AssumedValue::AbdomenFriction => case.is_abdomen(),
+            AssumedValue::TravelInAir => true,
             // The abdomen's motion ends in the kidney.
-            Number::Behind => !case.is_abdomen(),
-            Number::TorqueNoise => case.on_arm(),
+            AssumedValue::TimeBehindTarget => !case.is_abdomen(),
+            AssumedValue::TorqueNoise => case.on_arm(),
         }
     }
 }
@@ -144,50 +148,54 @@ impl Change {
     /// `K of the stack halved`.
     #[must_use]
     pub fn words(self) -> String {
-        format!("{} {}", self.number.name(), if self.doubled { "doubled" } else { "halved" })
+        format!("{} {}", self.value.name(), if self.doubled { "doubled" } else { "halved" })
     }
 
     /// Changes a scenario.
     pub fn apply(self, scenario: &mut Scenario) {
         let factor = self.factor();
         for layer in &mut scenario.tissue.layers {
-            match self.number {
-                Number::GelStiffness
-                | Number::StackStiffness
-                | Number::LiverStiffness
-                | Number::AbdomenStiffness => layer.stiffness_n_per_m *= factor,
-                Number::GelFriction
-                | Number::StackFriction
-                | Number::LiverFriction
-                | Number::AbdomenFriction => layer.friction_ns_per_m2 *= factor,
-                Number::GelContrast => {
+            match self.value {
+                AssumedValue::GelStiffness
+                | AssumedValue::StackStiffness
+                | AssumedValue::LiverStiffness
+                | AssumedValue::AbdomenStiffness => layer.stiffness_n_per_m *= factor,
+                AssumedValue::GelFriction
+                | AssumedValue::StackFriction
+                | AssumedValue::LiverFriction
+                | AssumedValue::AbdomenFriction => layer.friction_ns_per_m2 *= factor,
+                AssumedValue::GelContrast => {
                     let ratio = layer.friction_ns_per_m2 / MIDDLE_NS_PER_M2;
                     layer.friction_ns_per_m2 = MIDDLE_NS_PER_M2 * libm::pow(ratio, factor);
                 }
-                Number::Latex | Number::LiverPuncture => {
+                AssumedValue::LatexPuncture | AssumedValue::LiverPuncture => {
                     layer.puncture_n = layer.puncture_n.map(|f| f * factor);
                 }
-                Number::LiverThickness => layer.thickness_m *= factor,
-                Number::Noise
-                | Number::Start
-                | Number::Behind
-                | Number::TorqueNoise
-                | Number::VirtualSigma => {}
+                AssumedValue::LiverThickness => layer.thickness_m *= factor,
+                AssumedValue::Noise
+                | AssumedValue::TravelInAir
+                | AssumedValue::TimeBehindTarget
+                | AssumedValue::TorqueNoise
+                | AssumedValue::VirtualSigma => {}
             }
         }
-        if let (Number::Start, Motion::Constant { start_m, .. } | Motion::Sinusoidal { start_m, .. }) =
-            (self.number, &mut scenario.motion)
+        if let (
+            AssumedValue::TravelInAir,
+            Motion::Constant { start_m, .. } | Motion::Sinusoidal { start_m, .. },
+        ) = (self.value, &mut scenario.motion)
         {
             *start_m *= factor;
         }
-        if let (Number::Behind, Some(out_s)) = (self.number, out_of_the_target_s(scenario))
+        if let (AssumedValue::TimeBehindTarget, Some(out_s)) = (self.value, out_of_the_target_s(scenario))
             && let Motion::Constant { duration_s, .. } | Motion::Sinusoidal { duration_s, .. } =
                 &mut scenario.motion
         {
             *duration_s = out_s + factor * (*duration_s - out_s);
         }
-        if let (Number::TorqueNoise, Sensor::Both { virtual_sensor, .. } | Sensor::Virtual(virtual_sensor)) =
-            (self.number, &mut scenario.sensor)
+        if let (
+            AssumedValue::TorqueNoise,
+            Sensor::Both { virtual_sensor, .. } | Sensor::Virtual(virtual_sensor),
+        ) = (self.value, &mut scenario.sensor)
         {
             virtual_sensor.torque_noise_nm *= factor;
         }
@@ -219,14 +227,14 @@ mod tests {
     fn every_change_makes_another_valid_scenario_of_the_experiments_that_it_enters() {
         for case in Case::ALL {
             let plain = case.scenario().expect("valid");
-            for change in Number::ALL.into_iter().flat_map(Number::changes) {
-                if !change.number.enters(case) {
+            for change in AssumedValue::ALL.into_iter().flat_map(AssumedValue::changes) {
+                if !change.value.enters(case) {
                     continue;
                 }
                 let mut changed = plain.clone();
                 change.apply(&mut changed);
                 // The middle gel stays where it is when the contrast changes.
-                if change.number != Number::GelContrast {
+                if change.value != AssumedValue::GelContrast {
                     assert_ne!(changed, plain, "{case:?} {}", change.words());
                 }
                 let checked = changed.check().map_err(|p| p.message);

@@ -2,21 +2,21 @@
 
 use crate::algorithm_variant::{Ablation, Sensor};
 use crate::all_runs::Study;
-use crate::assumed_value_changes::Number;
-use crate::claims::{Claim, VISIBLY};
-use crate::effect_size::{ENOUGH, Effect, Measured, Part, Scale};
+use crate::assumed_value_changes::AssumedValue;
+use crate::claims::{Claim, VISIBLE_RATIO};
+use crate::effect_size::{Effect, ExperimentValues, MIN_SEED_SHARE, Measured, Scale};
 use crate::paper_experiments::Case;
 use crate::run_outcome::Outcome;
 use crate::study_conditions::View;
-use crate::value_source::{Class, Sourced, inputs};
+use crate::value_source::{Class, SourcedTable, inputs};
 use stylet_report::{Cell, Section, Status, Table};
 
 /// Distinct values of an assumed value in the experiments that use it.
-fn values(number: Number) -> (String, String) {
+fn values(assumed: AssumedValue) -> (String, String) {
     let (mut values, mut classes): (Vec<String>, Vec<&str>) = (Vec::new(), Vec::new());
     for case in Case::ALL {
         let Ok(scenario) = case.scenario() else { continue };
-        for input in inputs(case, &scenario).into_iter().filter(|i| i.number == Some(number)) {
+        for input in inputs(case, &scenario).into_iter().filter(|i| i.assumed_value == Some(assumed)) {
             if !values.contains(&input.value) {
                 values.push(input.value);
             }
@@ -25,17 +25,17 @@ fn values(number: Number) -> (String, String) {
             }
         }
     }
-    if number == Number::GelContrast {
+    if assumed == AssumedValue::GelContrast {
         values.push("0.5 and 1.33 between neighbours".to_owned());
         classes.push(Class::Ours.words());
     }
     (values.join("; "), classes.join(", "))
 }
 
-fn row(number: Number, claims: &[Claim]) -> Vec<Cell> {
-    let (value, class) = values(number);
-    let [halved, doubled] = number.changes();
-    let hang = |change| {
+fn row(assumed: AssumedValue, claims: &[Claim]) -> Vec<Cell> {
+    let (value, class) = values(assumed);
+    let [halved, doubled] = assumed.changes();
+    let claims_decided_by = |change| {
         let ids: Vec<String> = claims
             .iter()
             .filter(|c| c.trials.iter().any(|t| t.change == change && t.decides))
@@ -45,26 +45,26 @@ fn row(number: Number, claims: &[Claim]) -> Vec<Cell> {
     };
     let tried: Vec<&str> = claims
         .iter()
-        .filter(|c| c.trials.iter().any(|t| t.change.number == number))
+        .filter(|c| c.trials.iter().any(|t| t.change.value == assumed))
         .map(|c| c.id.as_str())
         .collect();
     vec![
-        Cell::text(number.name()),
+        Cell::text(assumed.name()),
         Cell::text(value),
         Cell::text(class),
-        hang(halved),
-        hang(doubled),
+        claims_decided_by(halved),
+        claims_decided_by(doubled),
         Cell::text(tried.join(", ")),
     ]
 }
 
-/// Distance of the interval from the bar: the range of bars with the same verdict.
-fn room(effect: &Effect) -> String {
+/// The effect with its interval: limits outside it give the same verdict.
+fn interval_text(effect: &Effect) -> String {
     effect.interval.map_or("–".to_owned(), |_| effect.words())
 }
 
 /// A claim's effect with changed values, and whether its verdict depends on them.
-fn hangs(claims: &[Claim], id: &str, tried: &[(&str, Effect)]) -> String {
+fn effects_with_changes(claims: &[Claim], id: &str, tried: &[(&str, Effect)]) -> String {
     let Some(primary) = claims.iter().find(|c| c.id == id).and_then(|c| c.primary.as_ref()) else {
         return String::new();
     };
@@ -77,22 +77,24 @@ fn hangs(claims: &[Claim], id: &str, tried: &[(&str, Effect)]) -> String {
 }
 
 fn share(runs: &[&[Outcome]], holds: impl Fn(&Outcome) -> bool) -> Effect {
-    let part = |runs: &&[Outcome]| Part::new("", runs.iter().map(|o| Some(f64::from(u8::from(holds(o))))));
+    let part = |runs: &&[Outcome]| {
+        ExperimentValues::new("", runs.iter().map(|o| Some(f64::from(u8::from(holds(o))))))
+    };
     Measured { scale: Scale::Share, parts: runs.iter().map(part).collect() }.effect()
 }
 
 /// Claim d with other thresholds of visibility.
-fn visibly(study: &Study, claims: &[Claim]) -> String {
+fn other_visibility_thresholds(study: &Study, claims: &[Claim]) -> String {
     let runs = View::primary(study).kv(Case::Gel25Sinusoidal);
     let with = |times: f64| {
-        let bar = 1.0 + times * (VISIBLY - 1.0);
+        let bar = 1.0 + times * (VISIBLE_RATIO - 1.0);
         share(&[runs], |o| o.cumulative_ratio.is_some_and(|r| r > bar))
     };
-    hangs(claims, "d", &[("halved", with(0.5)), ("doubled", with(2.0))])
+    effects_with_changes(claims, "d", &[("halved", with(0.5)), ("doubled", with(2.0))])
 }
 
 /// Claims e and f1 if a rupture must be found within 0.5 s.
-fn sooner(study: &Study, claims: &[Claim]) -> String {
+fn shorter_detection_window(study: &Study, claims: &[Claim]) -> String {
     use Sensor::{ForceTorque, Virtual};
     let view = View::primary(study);
     let of = |list: &[(Case, Sensor)]| {
@@ -109,12 +111,12 @@ fn sooner(study: &Study, claims: &[Claim]) -> String {
         (Case::LiverArm, Virtual),
         (Case::AbdomenArm, Virtual),
     ];
-    let e = hangs(claims, "e", &[("halved", of(&stack))]);
-    format!("{e}; {}", hangs(claims, "f1", &[("halved", of(&either))]))
+    let e = effects_with_changes(claims, "e", &[("halved", of(&stack))]);
+    format!("{e}; {}", effects_with_changes(claims, "f1", &[("halved", of(&either))]))
 }
 
 /// The claims whose effect would exist, or not, with another required share of seeds.
-fn enough(claims: &[Claim]) -> String {
+fn other_seed_shares(claims: &[Claim]) -> String {
     let others = |share: f64| {
         let ids: Vec<&str> = claims
             .iter()
@@ -126,7 +128,7 @@ fn enough(claims: &[Claim]) -> String {
     };
     format!(
         "claims whose primary effect then exists or exists no longer: halved {}, all seeds asked for {}",
-        others(ENOUGH / 2.0),
+        others(MIN_SEED_SHARE / 2.0),
         others(1.0)
     )
 }
@@ -134,7 +136,7 @@ fn enough(claims: &[Claim]) -> String {
 /// The section of the page.
 #[must_use]
 pub fn section(study: &Study, claims: &[Claim]) -> Section {
-    let numbers = Number::ALL.iter().map(|n| row(*n, claims)).collect();
+    let numbers = AssumedValue::ALL.iter().map(|n| row(*n, claims)).collect();
     let bars = claims
         .iter()
         .filter_map(|c| {
@@ -143,7 +145,7 @@ pub fn section(study: &Study, claims: &[Claim]) -> Section {
                 Cell::text(format!("({}) {}", c.id, c.claim)),
                 Cell::text(primary.bar.words()),
                 Cell::text(Class::Ours.words()),
-                Cell::number(room(&primary.effect)),
+                Cell::number(interval_text(&primary.effect)),
             ])
         })
         .collect();
@@ -173,10 +175,10 @@ pub fn section(study: &Study, claims: &[Claim]) -> Section {
             "s1 0.15, 0.1, 0.05, 0.03 N; beta 0.075, 0.05, 0.15 N/s; 10 seeds, 4 on the arm",
             "the published range; the sensitivity condition \"published default tuning\" does without".to_owned(),
         ),
-        ("when a rupture counts as found", "declared within 1 s", sooner(study, claims)),
-        ("over-compensation that is visible", "5 %", visibly(study, claims)),
-        ("share of the seeds that must give a value", "0.8", enough(claims)),
-        ("halving and doubling", "a factor of two", "a guess at how wrong a chosen number can be".to_owned()),
+        ("when a rupture counts as found", "declared within 1 s", shorter_detection_window(study, claims)),
+        ("over-compensation that is visible", "5 %", other_visibility_thresholds(study, claims)),
+        ("share of the seeds that must give a value", "0.8", other_seed_shares(claims)),
+        ("halving and doubling", "a factor of two", "an assumed bound on the error of a chosen value".to_owned()),
         (
             "noise seeds",
             "50; 12 for halved and doubled numbers, 2 on the arm",
@@ -186,15 +188,15 @@ pub fn section(study: &Study, claims: &[Claim]) -> Section {
     let fixed = fixed.map(|(what, value, why)| {
         vec![Cell::text(what), Cell::text(value), Cell::text(Class::Ours.words()), Cell::text(why)]
     });
-    Section::new("Numbers of ours, and the verdicts that hang on them")
+    Section::new("Assumed values, and the verdicts that depend on them")
         .text(
             "Every number that the paper does not give was halved and doubled, one at a time, and the primary conditions computed again. A claim's letter: its \
-             effect then lies on the other side of the bar, or exists only with or only without the change; such a verdict is `assumed`.",
+             effect then lies on the other side of the limit, or exists only with or only without the change; such a verdict is `assumed`.",
         )
         .table(
-            Sourced::named(Table {
+            SourcedTable::named(Table {
                 title: "Halved and doubled".to_owned(),
-                headers: ["number", "value", "whose", "halved: hang on it", "doubled: hang on it", "tried on"]
+                headers: ["number", "value", "whose", "halved: verdicts that change", "doubled: verdicts that change", "tried on"]
                     .map(String::from)
                     .to_vec(),
                 rows: numbers,
@@ -203,18 +205,18 @@ pub fn section(study: &Study, claims: &[Claim]) -> Section {
             .into_table(),
         )
         .table(
-            Sourced::named(Table {
-                title: "Bars: a verdict changes when its bar is moved across the interval".to_owned(),
-                headers: ["claim (the paper's)", "bar", "whose", "effect (computed)"].map(String::from).to_vec(),
+            SourcedTable::named(Table {
+                title: "Criteria: a verdict changes when its limit is moved across the interval".to_owned(),
+                headers: ["claim (the paper's)", "criterion", "whose", "effect (computed)"].map(String::from).to_vec(),
                 rows: bars,
                 ..Table::default()
             })
             .into_table(),
         )
         .table(
-            Sourced::named(Table {
+            SourcedTable::named(Table {
                 title: "Chosen, but not halved and doubled".to_owned(),
-                headers: ["what", "value", "whose", "what hangs on it (computed)"].map(String::from).to_vec(),
+                headers: ["what", "value", "whose", "what depends on it (computed)"].map(String::from).to_vec(),
                 rows: fixed.into(),
                 ..Table::default()
             })

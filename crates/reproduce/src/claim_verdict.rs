@@ -1,7 +1,7 @@
 //! The rule from the primary condition to the verdict, the same for all claims (`claims/README.md`).
 
 use crate::assumed_value_changes::Change;
-use crate::effect_size::{Bar, Effect, Says};
+use crate::effect_size::{Criterion, CriterionResult, Effect};
 use serde::Serialize;
 
 /// Verdict on a claim.
@@ -14,7 +14,7 @@ pub enum Verdict {
     Contradicted,
     /// The verdict depends on an assumed value.
     Assumed,
-    /// The interval contains the bar, or too few seeds give a value.
+    /// The interval contains the limit of the criterion, or too few seeds give a value.
     Undecided,
     /// Not testable by simulation.
     Untestable,
@@ -41,14 +41,14 @@ pub struct Trial {
     pub change: Change,
     /// The effect with the change.
     pub effect: Effect,
-    /// Whether it lies on the other side of the bar, or exists only with or only without the change.
+    /// Whether it lies on the other side of the limit, or exists only with or only without the change.
     pub decides: bool,
 }
 
 impl Trial {
     /// Compares with the primary effect.
     #[must_use]
-    pub fn new(change: Change, effect: Effect, primary: &Effect, bar: Bar) -> Self {
+    pub fn new(change: Change, effect: Effect, primary: &Effect, bar: Criterion) -> Self {
         let decides = bar.side(&effect) != bar.side(primary);
         Self { change, effect, decides }
     }
@@ -56,21 +56,21 @@ impl Trial {
 
 /// The verdict of the primary condition, unless it depends on an assumed value. Sensitivity conditions are not used.
 #[must_use]
-pub fn verdict(primary: Says, trials: &[Trial]) -> Verdict {
+pub fn verdict(primary: CriterionResult, trials: &[Trial]) -> Verdict {
     if trials.iter().any(|t| t.decides) {
         return Verdict::Assumed;
     }
     match primary {
-        Says::Supports => Verdict::Supported,
-        Says::Contradicts => Verdict::Contradicted,
-        Says::Undecided => Verdict::Undecided,
+        CriterionResult::Supports => Verdict::Supported,
+        CriterionResult::Contradicts => Verdict::Contradicted,
+        CriterionResult::Undecided => Verdict::Undecided,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::assumed_value_changes::Number;
+    use crate::assumed_value_changes::AssumedValue;
     use crate::seed_interval::Interval;
 
     fn effect(value: f64) -> Effect {
@@ -79,15 +79,15 @@ mod tests {
 
     #[test]
     fn the_primary_condition_decides_unless_a_chosen_number_does() {
-        let bar = Bar::Below(1.0);
-        let [halved, doubled] = Number::Noise.changes();
+        let bar = Criterion::Below(1.0);
+        let [halved, doubled] = AssumedValue::Noise.changes();
         let trial = |change, value| Trial::new(change, effect(value), &effect(0.5), bar);
         let (same, other) = (trial(halved, 0.7), trial(doubled, 1.2));
         assert!(!same.decides && other.decides);
-        assert_eq!(verdict(Says::Supports, std::slice::from_ref(&same)), Verdict::Supported);
-        assert_eq!(verdict(Says::Contradicts, &[]), Verdict::Contradicted);
-        assert_eq!(verdict(Says::Undecided, &[]), Verdict::Undecided);
-        assert_eq!(verdict(Says::Supports, &[same, other]), Verdict::Assumed);
+        assert_eq!(verdict(CriterionResult::Supports, std::slice::from_ref(&same)), Verdict::Supported);
+        assert_eq!(verdict(CriterionResult::Contradicts, &[]), Verdict::Contradicted);
+        assert_eq!(verdict(CriterionResult::Undecided, &[]), Verdict::Undecided);
+        assert_eq!(verdict(CriterionResult::Supports, &[same, other]), Verdict::Assumed);
         let none = Effect { interval: None, seeds: 0, of: 20 };
         assert!(Trial::new(halved, none, &effect(0.5), bar).decides, "an effect that exists no longer");
     }

@@ -21,7 +21,7 @@ pub const TRACE_BELOW: [f64; 14] = [
 ];
 
 /// Number of missed and false ruptures.
-fn wrong(insertion: &Insertion, samples: &[Sample], config: &EnhanceConfig) -> usize {
+fn count_missed_and_false(insertion: &Insertion, samples: &[Sample], config: &EnhanceConfig) -> usize {
     let mut core =
         Enhancer::new(config.clone(), insertion.surface_m(), vec![Sample::default(); samples.len()]);
     let mut detections = Vec::new();
@@ -52,7 +52,10 @@ impl Tuning {
             for on_n_per_s in ON_N_PER_S {
                 let mut tried = Tuning { sigma_rupture_n, on_n_per_s, ..Tuning::default() };
                 let Some(config) = with(&tried, Ablation::None) else { return tried };
-                tried.wrong = recordings.iter().map(|(once, samples)| wrong(once, samples, &config)).sum();
+                tried.wrong = recordings
+                    .iter()
+                    .map(|(once, samples)| count_missed_and_false(once, samples, &config))
+                    .sum();
                 if best.is_none_or(|b| tried.wrong < b.wrong) {
                     best = Some(tried);
                 }

@@ -1,23 +1,23 @@
-//! Effect sizes: the quantity of a claim as one number with its interval over the seeds, compared with a bar.
+//! Effect sizes: the quantity of a claim as one number with its interval over the seeds, compared with a criterion.
 
 use crate::seed_interval::{Interval, geometric_mean, mean, share};
 use serde::{Serialize, Serializer};
 use stylet_report::significant;
 
 /// Share of the seeds that must give a value; with fewer there is no effect.
-pub const ENOUGH: f64 = 0.8;
+pub const MIN_SEED_SHARE: f64 = 0.8;
 
 /// One experiment of an effect: a value per seed, or none.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Part {
+pub struct ExperimentValues {
     /// The experiment.
     pub name: String,
     /// Values by seed.
     pub values: Vec<Option<f64>>,
 }
 
-impl Part {
-    /// A part.
+impl ExperimentValues {
+    /// Values by seed of the experiment `name`.
     #[must_use]
     pub fn new(name: impl Into<String>, values: impl IntoIterator<Item = Option<f64>>) -> Self {
         Self { name: name.into(), values: values.into_iter().collect() }
@@ -72,7 +72,7 @@ pub struct Measured {
     /// Aggregation.
     pub scale: Scale,
     /// The experiments.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ExperimentValues>,
 }
 
 /// An effect with its interval.
@@ -81,9 +81,9 @@ pub struct Effect {
     /// Value and 95 % interval; none when too few seeds give a value.
     #[serde(flatten)]
     pub interval: Option<Interval>,
-    /// Seeds that gave a value,
+    /// Number of seeds that gave a value.
     pub seeds: usize,
-    /// of so many.
+    /// Number of all seeds.
     pub of: usize,
 }
 
@@ -96,20 +96,21 @@ impl Measured {
             let values: Vec<Option<f64>> = self.parts.iter().map(|p| p.values[i]).collect();
             self.scale.of_seed(&values)
         };
-        Self::over(self.scale, (0..of).map(seed))
+        Self::aggregate(self.scale, (0..of).map(seed))
     }
 
     /// The effect of each experiment alone.
     #[must_use]
     pub fn parts(&self) -> Vec<(String, Effect)> {
-        let one = |p: &Part| (p.name.clone(), Self::over(self.scale, p.values.iter().copied()));
+        let one =
+            |p: &ExperimentValues| (p.name.clone(), Self::aggregate(self.scale, p.values.iter().copied()));
         self.parts.iter().map(one).collect()
     }
 
-    fn over(scale: Scale, values: impl Iterator<Item = Option<f64>>) -> Effect {
+    fn aggregate(scale: Scale, values: impl Iterator<Item = Option<f64>>) -> Effect {
         let all: Vec<Option<f64>> = values.collect();
         let some: Vec<f64> = all.iter().copied().flatten().filter(|x| x.is_finite()).collect();
-        let enough = some.len() as f64 >= ENOUGH * all.len() as f64;
+        let enough = some.len() as f64 >= MIN_SEED_SHARE * all.len() as f64;
         Effect { interval: scale.over_seeds(&some).filter(|_| enough), seeds: some.len(), of: all.len() }
     }
 }
@@ -128,33 +129,33 @@ impl Effect {
     }
 }
 
-/// Position of an effect relative to its bar.
+/// Position of an effect relative to its criterion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Says {
+pub enum CriterionResult {
     /// The whole interval on the claim's side.
     Supports,
     /// The whole interval on the other side.
     Contradicts,
-    /// The interval contains the bar, or there is no effect.
+    /// The interval contains the limit of the criterion, or there is no effect.
     Undecided,
 }
 
-impl Says {
+impl CriterionResult {
     /// In words.
     #[must_use]
     pub const fn words(self) -> &'static str {
         match self {
-            Says::Supports => "supports",
-            Says::Contradicts => "contradicts",
-            Says::Undecided => "undecided",
+            CriterionResult::Supports => "supports",
+            CriterionResult::Contradicts => "contradicts",
+            CriterionResult::Undecided => "undecided",
         }
     }
 }
 
 /// Condition of a claim on its effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Bar {
+pub enum Criterion {
     /// Above a number.
     Above(f64),
     /// Below a number.
@@ -163,41 +164,41 @@ pub enum Bar {
     Between(f64, f64),
 }
 
-impl Bar {
+impl Criterion {
     /// `between 0.75 and 1`.
     #[must_use]
     pub fn words(self) -> String {
         let text = |x: f64| if x != 0.0 && x.abs() < 1e-3 { format!("{x:e}") } else { format!("{x}") };
         match self {
-            Bar::Above(x) => format!("above {}", text(x)),
-            Bar::Below(x) => format!("below {}", text(x)),
-            Bar::Between(a, b) => format!("between {} and {}", text(a), text(b)),
+            Criterion::Above(x) => format!("above {}", text(x)),
+            Criterion::Below(x) => format!("below {}", text(x)),
+            Criterion::Between(a, b) => format!("between {} and {}", text(a), text(b)),
         }
     }
 
     fn holds(self, x: f64) -> bool {
         match self {
-            Bar::Above(bar) => x > bar,
-            Bar::Below(bar) => x < bar,
-            Bar::Between(low, high) => low < x && x < high,
+            Criterion::Above(bar) => x > bar,
+            Criterion::Below(bar) => x < bar,
+            Criterion::Between(low, high) => low < x && x < high,
         }
     }
 
     /// Position of an effect relative to this condition.
     #[must_use]
-    pub fn judge(self, effect: &Effect) -> Says {
-        let Some(Interval { low, high, .. }) = effect.interval else { return Says::Undecided };
+    pub fn evaluate(self, effect: &Effect) -> CriterionResult {
+        let Some(Interval { low, high, .. }) = effect.interval else { return CriterionResult::Undecided };
         let outside = match self {
-            Bar::Above(bar) => high <= bar,
-            Bar::Below(bar) => low >= bar,
-            Bar::Between(from, to) => high <= from || low >= to,
+            Criterion::Above(bar) => high <= bar,
+            Criterion::Below(bar) => low >= bar,
+            Criterion::Between(from, to) => high <= from || low >= to,
         };
         if self.holds(low) && self.holds(high) {
-            Says::Supports
+            CriterionResult::Supports
         } else if outside {
-            Says::Contradicts
+            CriterionResult::Contradicts
         } else {
-            Says::Undecided
+            CriterionResult::Undecided
         }
     }
 
@@ -208,7 +209,7 @@ impl Bar {
     }
 }
 
-impl Serialize for Bar {
+impl Serialize for Criterion {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_str(&self.words())
     }
@@ -224,13 +225,19 @@ mod tests {
 
     #[test]
     fn the_whole_interval_decides() {
-        assert_eq!(Bar::Below(1.0).judge(&effect(0.8, 0.9, 0.99)), Says::Supports);
-        assert_eq!(Bar::Below(1.0).judge(&effect(0.8, 0.9, 1.01)), Says::Undecided);
-        assert_eq!(Bar::Below(1.0).judge(&effect(1.0, 1.1, 1.2)), Says::Contradicts);
-        assert_eq!(Bar::Between(0.75, 1.0).judge(&effect(0.5, 0.6, 0.7)), Says::Contradicts);
-        assert_eq!(Bar::Between(0.75, 1.0).judge(&effect(0.7, 0.8, 0.9)), Says::Undecided);
+        assert_eq!(Criterion::Below(1.0).evaluate(&effect(0.8, 0.9, 0.99)), CriterionResult::Supports);
+        assert_eq!(Criterion::Below(1.0).evaluate(&effect(0.8, 0.9, 1.01)), CriterionResult::Undecided);
+        assert_eq!(Criterion::Below(1.0).evaluate(&effect(1.0, 1.1, 1.2)), CriterionResult::Contradicts);
+        assert_eq!(
+            Criterion::Between(0.75, 1.0).evaluate(&effect(0.5, 0.6, 0.7)),
+            CriterionResult::Contradicts
+        );
+        assert_eq!(
+            Criterion::Between(0.75, 1.0).evaluate(&effect(0.7, 0.8, 0.9)),
+            CriterionResult::Undecided
+        );
         let none = Effect { interval: None, seeds: 3, of: 50 };
-        assert_eq!(Bar::Above(0.0).judge(&none), Says::Undecided);
+        assert_eq!(Criterion::Above(0.0).evaluate(&none), CriterionResult::Undecided);
         assert_eq!(none.words(), "a value in 3 of 50 seeds only");
     }
 
@@ -238,13 +245,16 @@ mod tests {
     fn too_few_values_are_no_effect_and_a_missing_experiment_is_no_smallest_ratio() {
         let values = |some: usize| (0..10).map(move |i| (i < some).then_some(2.0));
         let of = |parts| Measured { scale: Scale::SmallestRatio, parts }.effect();
-        assert!(of(vec![Part::new("a", values(8))]).interval.is_some());
-        assert!(of(vec![Part::new("a", values(7))]).interval.is_none());
-        let two = of(vec![Part::new("a", values(10)), Part::new("b", values(7))]);
+        assert!(of(vec![ExperimentValues::new("a", values(8))]).interval.is_some());
+        assert!(of(vec![ExperimentValues::new("a", values(7))]).interval.is_none());
+        let two = of(vec![ExperimentValues::new("a", values(10)), ExperimentValues::new("b", values(7))]);
         assert_eq!((two.interval, two.seeds), (None, 7));
         let share = Measured {
             scale: Scale::Share,
-            parts: vec![Part::new("a", [Some(1.0); 50]), Part::new("b", [Some(0.0); 50])],
+            parts: vec![
+                ExperimentValues::new("a", [Some(1.0); 50]),
+                ExperimentValues::new("b", [Some(0.0); 50]),
+            ],
         };
         assert_eq!(share.effect().interval.map(|i| i.value), Some(0.5));
         assert_eq!(share.parts()[0].1.interval.map(|i| i.high), Some(1.0));

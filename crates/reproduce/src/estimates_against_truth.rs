@@ -6,7 +6,7 @@ use crate::paper_experiments::Case;
 use crate::run_outcome::Outcome;
 use crate::seed_spread::Spread;
 use crate::study_conditions::{SENSITIVITY_SEEDS_ARM, View};
-use crate::value_source::Sourced;
+use crate::value_source::SourcedTable;
 use stylet_report::Colour;
 use stylet_report::svg::{FigureOptions, Strip, StripChart, StripGroup, strip_chart};
 use stylet_report::{Block, Cell, Section, Status, SvgImage, Table, percent, significant};
@@ -18,7 +18,7 @@ type Row = (String, Case, u32, Sensor, Setup);
 const fn setup(sensor: Sensor) -> Setup {
     match sensor {
         Sensor::ForceTorque => Setup::Tuned,
-        Sensor::Virtual => Setup::Own,
+        Sensor::Virtual => Setup::ScenarioThresholds,
     }
 }
 
@@ -54,7 +54,7 @@ fn cell(spread: Option<Spread>) -> Cell {
     }
 }
 
-fn table(study: &Study, title: &str, layers: usize, rows: &[Row]) -> Sourced {
+fn table(study: &Study, title: &str, layers: usize, rows: &[Row]) -> SourcedTable {
     let mut out = Vec::new();
     for (name, case, noise_mn, sensor, setup) in rows {
         for kelvin_voigt in [false, true] {
@@ -82,7 +82,7 @@ fn table(study: &Study, title: &str, layers: usize, rows: &[Row]) -> Sourced {
     headers.extend((1..=layers).map(|i| format!("K{i} %")));
     headers.extend((1..=layers).map(|i| format!("b{i} %")));
     headers.push("D %".to_owned());
-    Sourced::computed(Table { title: title.to_owned(), headers, rows: out, ..Table::default() })
+    SourcedTable::computed(Table { title: title.to_owned(), headers, rows: out, ..Table::default() })
 }
 
 fn noises(case: Case, name: &str) -> Vec<Row> {
@@ -202,7 +202,7 @@ pub fn section(study: &Study, pictures: &[(&'static str, String)]) -> Section {
     let arm = |case: Case, name: &str| -> Vec<Row> {
         vec![
             (format!("{name} on the arm, force/torque"), case, NOISE_MN, ForceTorque, Setup::Tuned),
-            (format!("{name} on the arm, virtual"), case, NOISE_MN, Virtual, Setup::Own),
+            (format!("{name} on the arm, virtual"), case, NOISE_MN, Virtual, Setup::ScenarioThresholds),
         ]
     };
     let mut liver = noises(Case::Liver, "liver");

@@ -56,15 +56,15 @@ pub struct Reproduction {
 /// All runs needed by claims, figures and tables, over the noise seeds from `first_seed` on.
 #[must_use]
 pub fn plan(first_seed: u64, seeds: u64) -> Plan {
-    let asking = Study::asking(first_seed, seeds);
-    let _ = claims::all(&asking);
-    figures::ask(&asking);
-    let _ = algorithm_switches::section(&asking);
-    let _ = estimates_against_truth::section(&asking, &estimates_against_truth::pictures(&asking));
-    asking.plan()
+    let planning = Study::planning(first_seed, seeds);
+    let _ = claims::all(&planning);
+    figures::request_runs(&planning);
+    let _ = algorithm_switches::section(&planning);
+    let _ = estimates_against_truth::section(&planning, &estimates_against_truth::pictures(&planning));
+    planning.plan()
 }
 
-/// Runs a plan, evaluates the claims, draws the figures. `done` is called once for each of [`Plan::recordings_in_all`]. The output
+/// Runs a plan, evaluates the claims, draws the figures. `done` is called once for each of [`Plan::recording_count`]. The output
 /// does not depend on the number of threads.
 ///
 /// # Errors

@@ -4,9 +4,9 @@ use crate::all_runs::Study;
 use crate::assumed_values;
 use crate::claim_verdict::Verdict;
 use crate::claims::{Claim, Condition};
-use crate::effect_size::Says;
+use crate::effect_size::CriterionResult;
 use crate::figures::Figure;
-use crate::value_source::Sourced;
+use crate::value_source::SourcedTable;
 use crate::{algorithm_switches, estimates_against_truth};
 use stylet_report::{Block, Cell, Page, Section, Status, SvgImage, Table};
 
@@ -19,11 +19,11 @@ const fn status(verdict: Verdict) -> Status {
     }
 }
 
-const fn said(says: Says) -> Status {
+const fn said(says: CriterionResult) -> Status {
     match says {
-        Says::Supports => Status::Good,
-        Says::Contradicts => Status::Bad,
-        Says::Undecided => Status::Warn,
+        CriterionResult::Supports => Status::Good,
+        CriterionResult::Contradicts => Status::Bad,
+        CriterionResult::Undecided => Status::Warn,
     }
 }
 
@@ -35,13 +35,13 @@ fn summary(claims: &[Claim], study: &Study) -> Section {
                 || ("–".to_owned(), "–".to_owned(), Cell::text("–")),
                 |p| (p.effect.words(), p.bar.words(), Cell::text(p.says.words()).status(said(p.says))),
             );
-            let mut hangs: Vec<&str> = c.hangs_on().map(|t| t.change.number.name()).collect();
+            let mut hangs: Vec<&str> = c.verdict_changing_trials().map(|t| t.change.value.name()).collect();
             hangs.dedup();
-            let carried = |says: Says| c.sensitivities.iter().filter(|s| s.says == says).count();
+            let carried = |says: CriterionResult| c.sensitivities.iter().filter(|s| s.says == says).count();
             let carries = if c.sensitivities.is_empty() {
                 "–".to_owned()
             } else {
-                format!("{} of {}", carried(Says::Supports), c.sensitivities.len())
+                format!("{} of {}", carried(CriterionResult::Supports), c.sensitivities.len())
             };
             vec![
                 Cell::text(format!("({}) {}", c.id, c.claim)),
@@ -58,24 +58,24 @@ fn summary(claims: &[Claim], study: &Study) -> Section {
     Section::new("Claims")
         .text(format!(
             "The primary condition is the paper's own protocol and decides alone: from it one effect with its 95 % interval over the noise seeds {first} to {last}. \
-             Supported: the whole interval on the claim's side of the bar; contradicted: on the other side; undecided: neither. Assumed: a number that we chose \
+             Supported: the whole interval on the claim's side of the limit; contradicted: on the other side; undecided: neither. Assumed: a number that we chose \
              decides, because the effect changes sides when it is halved or doubled. Untestable: no simulation can say. Sensitivity conditions say how far a \
-             claim carries and change no verdict. Protocols and bars were written down before the numbers were computed; claims/README.md lists at its end what was changed afterwards, and why. S: supplement, M: main paper."
+             claim carries and change no verdict. Protocols and criteria were written down before the numbers were computed; claims/README.md lists at its end what was changed afterwards, and why. S: supplement, M: main paper."
         ))
         .text(
             "The intervals hold the noise of the simulated sensor and nothing else: not the scatter of real gels, not the error of the law. A narrow one says that \
              the simulation is sure, not that the paper is right or wrong.",
         )
         .table(
-            Sourced::named(Table {
+            SourcedTable::named(Table {
                 title: "Claims and verdicts".to_owned(),
                 headers: [
                     "claim (the paper's)",
                     "verdict (computed)",
                     "effect (computed)",
-                    "bar (ours)",
+                    "criterion (ours)",
                     "primary condition (computed)",
-                    "hangs on numbers of ours (computed)",
+                    "depends on assumed values (computed)",
                     "sensitivity conditions in which it holds (computed)",
                 ]
                 .map(String::from)
@@ -100,8 +100,8 @@ fn conditions(title: &str, list: &[Condition]) -> Table {
             ]
         })
         .collect();
-    let headers = ["condition", "effect", "bar (ours)", "says", "seeds with a value"];
-    Sourced::computed(Table {
+    let headers = ["condition", "effect", "criterion (ours)", "says", "seeds with a value"];
+    SourcedTable::computed(Table {
         title: title.to_owned(),
         headers: headers.map(String::from).to_vec(),
         rows,
@@ -152,7 +152,7 @@ fn detail(claim: &Claim) -> Section {
         .table(conditions("Primary condition, and its experiments one by one", &parts))
         .table(conditions("Sensitivity conditions: how far it carries", &claim.sensitivities))
         .table(
-            Sourced::computed(Table {
+            SourcedTable::computed(Table {
                 title: "Numbers of ours, halved and doubled".to_owned(),
                 headers: ["change", "effect", "", "seeds with a value"].map(String::from).to_vec(),
                 rows: trials,
@@ -181,11 +181,11 @@ fn figure(figure: Figure) -> Section {
 fn tunings(study: &Study) -> Table {
     let rows = study
         .tunings()
-        .filter(|((recorded, _), _)| recorded.change.is_none())
-        .map(|((recorded, sensor), t)| {
-            let noise = format!("{} mN", recorded.noise_mn);
+        .filter(|((recording_key, _), _)| recording_key.change.is_none())
+        .map(|((recording_key, sensor), t)| {
+            let noise = format!("{} mN", recording_key.noise_mn);
             vec![
-                Cell::text(format!("{}, {} sensor", recorded.case.name(), sensor.name())),
+                Cell::text(format!("{}, {} sensor", recording_key.case.name(), sensor.name())),
                 Cell::number(noise),
                 Cell::number(format!("{}", t.sigma_rupture_n)),
                 Cell::number(format!("{}", t.on_n_per_s)),
@@ -194,7 +194,7 @@ fn tunings(study: &Study) -> Table {
         })
         .collect();
     let headers = ["recording", "noise", "s1, N", "beta, N/s", "missed and false over the tuning seeds"];
-    Sourced::computed(Table {
+    SourcedTable::computed(Table {
         title: "How the detection was tuned, within the laboratory's range".to_owned(),
         headers: headers.map(String::from).to_vec(),
         rows,

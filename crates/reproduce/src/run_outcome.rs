@@ -60,8 +60,8 @@ impl Outcome {
                 scorer.add_event(out);
             }
             let (tip_n, total_n) = (truth.tip_force_n[i], truth.tissue_force_n[i]);
-            let moment = TrueSample { position_m, force_n, tip_n, total_n };
-            scorer.add_sample(&moment, &EnhancedSample::from(out));
+            let sample_truth = TrueSample { position_m, force_n, tip_n, total_n };
+            scorer.add_sample(&sample_truth, &EnhancedSample::from(out));
             if let Some(estimate) = out.estimate {
                 found = (found + estimate.added_friction_ns_per_m).max(0.0);
                 estimates.push(estimate);
@@ -208,7 +208,7 @@ mod tests {
             assert_eq!(none.friction_only, other.friction_only, "{case:?}");
             assert!(none.with_drop.iter().all(Option::is_none), "{case:?}");
         }
-        // Where the data do not tell K from b the drop decides, so that the two estimates really differ.
+        // Where the data do not separate K from b, the drop decides, so that the two estimates differ.
         let insertion =
             Insertion::of(&Case::LatexConstant.scenario().expect("valid"), 1).expect("a simulation");
         let samples = insertion.samples(&insertion.reading(1, 10));

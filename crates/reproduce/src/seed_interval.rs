@@ -45,7 +45,7 @@ mod tests {
     }
 
     #[test]
-    fn the_interval_of_a_mean_covers_the_truth_as_often_as_it_says() {
+    fn the_interval_of_a_mean_has_its_nominal_coverage() {
         // A linear congruential generator; the sum of twelve uniform numbers is nearly normal.
         let mut state = 1u64;
         let mut uniform = || {

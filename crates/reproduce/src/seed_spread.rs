@@ -15,9 +15,9 @@ pub struct Spread {
     pub mean: f64,
     /// Standard deviation (of a sample).
     pub sd: f64,
-    /// Seeds that gave a value,
+    /// Number of seeds that gave a value.
     pub n: usize,
-    /// of so many.
+    /// Number of all seeds.
     pub of: usize,
 }
 

@@ -1,16 +1,16 @@
 //! Conditions under which a claim evaluates the study.
 
 use crate::algorithm_variant::{Ablation, Sensor, Setup, Variant};
-use crate::all_runs::{Key, NOISE_MN, Recorded, Study};
-use crate::assumed_value_changes::{Change, Number};
+use crate::all_runs::{NOISE_MN, RecordingKey, RunKey, Study};
+use crate::assumed_value_changes::{AssumedValue, Change};
 use crate::paper_experiments::Case;
 use crate::run_outcome::{Offline, Outcome};
 
-/// Number of seeds for a halved or doubled assumed value,
+/// Number of seeds for a halved or doubled assumed value.
 pub const CHANGED_SEEDS: u64 = 12;
-/// the same for experiments on the arm,
+/// The same for experiments on the arm.
 pub const CHANGED_SEEDS_ARM: u64 = 2;
-/// and for sensitivity conditions that need separate simulations of the arm.
+/// Number of seeds for sensitivity conditions that need separate simulations of the arm.
 pub const SENSITIVITY_SEEDS_ARM: u64 = 4;
 
 /// The study under one condition: changed value, noise, prior knowledge of the algorithm, number of seeds.
@@ -18,7 +18,7 @@ pub const SENSITIVITY_SEEDS_ARM: u64 = 4;
 pub struct View<'a> {
     /// The study.
     pub study: &'a Study,
-    /// A number halved or doubled.
+    /// Assumed value that is halved or doubled.
     pub change: Option<Change>,
     /// Noise of the force/torque sensor in mN.
     pub noise_mn: u32,
@@ -53,11 +53,11 @@ impl<'a> View<'a> {
         Self { seeds: self.seeds.min(seeds), ..self }
     }
 
-    /// A number halved or doubled, on fewer seeds.
+    /// An assumed value halved or doubled, on fewer seeds.
     #[must_use]
     pub fn changed(self, change: Change, with_arm: bool) -> Self {
         let fewer = self.fewer(if with_arm { CHANGED_SEEDS_ARM } else { CHANGED_SEEDS });
-        if change.number == Number::Noise {
+        if change.value == AssumedValue::Noise {
             let noise_mn = if change.doubled { 2 * NOISE_MN } else { NOISE_MN / 2 };
             return Self { noise_mn, ..fewer };
         }
@@ -66,20 +66,20 @@ impl<'a> View<'a> {
 
     /// The recording of an experiment under this condition.
     #[must_use]
-    pub fn recorded(&self, case: Case) -> Recorded {
-        Recorded { case, change: self.change.filter(|c| c.number.enters(case)), noise_mn: self.noise_mn }
+    pub fn recording_key(&self, case: Case) -> RecordingKey {
+        RecordingKey { case, change: self.change.filter(|c| c.value.enters(case)), noise_mn: self.noise_mn }
     }
 
     /// The outcomes by seed.
     #[must_use]
     pub fn runs(&self, case: Case, sensor: Sensor, kelvin_voigt: bool, ablation: Ablation) -> &'a [Outcome] {
-        let mut recorded = self.recorded(case);
+        let mut recording_key = self.recording_key(case);
         if sensor == Sensor::Virtual {
             // The force/torque sensor's noise does not reach the virtual one.
-            recorded.noise_mn = NOISE_MN;
+            recording_key.noise_mn = NOISE_MN;
         }
         let setup = match self.change {
-            Some(Change { number: Number::VirtualSigma, doubled })
+            Some(Change { value: AssumedValue::VirtualSigma, doubled })
                 if sensor == Sensor::Virtual && self.setup == Setup::Tuned =>
             {
                 if doubled {
@@ -91,7 +91,7 @@ impl<'a> View<'a> {
             _ => self.setup,
         };
         let variant = Variant { kelvin_voigt, setup, ablation };
-        self.study.runs(Key { recorded, sensor, variant }, self.seeds)
+        self.study.runs(RunKey { recording_key, sensor, variant }, self.seeds)
     }
 
     /// Multi-layer model, force/torque sensor.
@@ -115,6 +115,6 @@ impl<'a> View<'a> {
     /// The offline estimates by seed.
     #[must_use]
     pub fn offline(&self, case: Case) -> &'a [Offline] {
-        self.study.offline(self.recorded(case), self.seeds)
+        self.study.offline(self.recording_key(case), self.seeds)
     }
 }

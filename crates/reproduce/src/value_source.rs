@@ -1,7 +1,7 @@
 //! Source class of each number on the page.
 
 use crate::all_runs::NOISE_MN;
-use crate::assumed_value_changes::Number;
+use crate::assumed_value_changes::AssumedValue;
 use crate::paper_experiments::Case;
 use stylet_report::{Cell, Table, significant};
 use stylet_scenario::{Motion, Scenario};
@@ -37,12 +37,12 @@ impl Class {
 
 /// A table with the source class of its numbers, in a separate column if it differs by row.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sourced {
+pub struct SourcedTable {
     classes: &'static [Class],
     table: Table,
 }
 
-impl Sourced {
+impl SourcedTable {
     /// Every number in the table was computed from runs.
     #[must_use]
     pub const fn computed(table: Table) -> Self {
@@ -79,7 +79,7 @@ pub struct Input {
     /// Reference or reason.
     pub why: &'static str,
     /// Name of its halved and doubled variants, if there are any.
-    pub number: Option<Number>,
+    pub assumed_value: Option<AssumedValue>,
 }
 
 fn list(scenario: &Scenario, scale: f64, of: impl Fn(&stylet_tissue::Layer) -> f64) -> String {
@@ -125,20 +125,25 @@ fn tissue(case: Case) -> [(Class, &'static str); 4] {
     }
 }
 
-const fn numbers(case: Case) -> [Option<Number>; 4] {
+const fn assumed_values(case: Case) -> [Option<AssumedValue>; 4] {
     if case.is_stack() {
-        [None, Some(Number::StackStiffness), Some(Number::StackFriction), Some(Number::Latex)]
+        [
+            None,
+            Some(AssumedValue::StackStiffness),
+            Some(AssumedValue::StackFriction),
+            Some(AssumedValue::LatexPuncture),
+        ]
     } else if case.is_liver() {
         [
-            Some(Number::LiverThickness),
-            Some(Number::LiverStiffness),
-            Some(Number::LiverFriction),
-            Some(Number::LiverPuncture),
+            Some(AssumedValue::LiverThickness),
+            Some(AssumedValue::LiverStiffness),
+            Some(AssumedValue::LiverFriction),
+            Some(AssumedValue::LiverPuncture),
         ]
     } else if case.is_abdomen() {
-        [None, Some(Number::AbdomenStiffness), Some(Number::AbdomenFriction), None]
+        [None, Some(AssumedValue::AbdomenStiffness), Some(AssumedValue::AbdomenFriction), None]
     } else {
-        [None, Some(Number::GelStiffness), Some(Number::GelFriction), None]
+        [None, Some(AssumedValue::GelStiffness), Some(AssumedValue::GelFriction), None]
     }
 }
 
@@ -146,44 +151,50 @@ const fn numbers(case: Case) -> [Option<Number>; 4] {
 #[must_use]
 pub fn inputs(case: Case, scenario: &Scenario) -> Vec<Input> {
     let mut all = Vec::new();
-    let mut add = |name: &str, value: String, class, why, number| {
-        all.push(Input { name: name.to_owned(), value, class, why, number });
+    let mut add = |name: &str, value: String, class, why, assumed_value| {
+        all.push(Input { name: name.to_owned(), value, class, why, assumed_value });
     };
     let [thickness, stiffness, friction, puncture] = tissue(case);
-    let number = numbers(case);
+    let assumed = assumed_values(case);
     add(
         "thickness",
         format!("{} mm", list(scenario, 1e3, |l| l.thickness_m)),
         thickness.0,
         thickness.1,
-        number[0],
+        assumed[0],
     );
     add(
         "K",
         format!("{} N/m", list(scenario, 1.0, |l| l.stiffness_n_per_m)),
         stiffness.0,
         stiffness.1,
-        number[1],
+        assumed[1],
     );
     add(
         "b",
         format!("{} N s/m²", list(scenario, 1.0, |l| l.friction_ns_per_m2)),
         friction.0,
         friction.1,
-        number[2],
+        assumed[2],
     );
     if scenario.tissue.layers.iter().any(|l| l.puncture_n.is_some()) {
         let text = |l: &stylet_tissue::Layer| l.puncture_n.map_or("–".to_owned(), |f| significant(f, 3));
         let values: Vec<String> = scenario.tissue.layers.iter().map(text).collect();
-        add("puncture force", format!("{} N", values.join(" / ")), puncture.0, puncture.1, number[3]);
+        add("puncture force", format!("{} N", values.join(" / ")), puncture.0, puncture.1, assumed[3]);
     }
-    let behind = Number::Behind.enters(case).then_some(Number::Behind);
+    let behind = AssumedValue::TimeBehindTarget.enters(case).then_some(AssumedValue::TimeBehindTarget);
     match scenario.motion {
         Motion::Constant { start_m, velocity_mps, duration_s } => {
             let speed = format!("{} mm/s", significant(velocity_mps * 1e3, 3));
             add("speed", speed, Class::Paper, "S sec. III", None);
             let start = format!("{} mm", significant(-start_m * 1e3, 3));
-            add("way in air", start, Class::Ours, "air to learn the noise in", Some(Number::Start));
+            add(
+                "way in air",
+                start,
+                Class::Ours,
+                "air to learn the noise in",
+                Some(AssumedValue::TravelInAir),
+            );
             add("duration", format!("{} s", significant(duration_s, 3)), Class::Ours, "air behind", behind);
         }
         Motion::Sinusoidal { start_m, amplitude_m, frequency_hz, duration_s, .. } => {
@@ -194,7 +205,13 @@ pub fn inputs(case: Case, scenario: &Scenario) -> Vec<Input> {
             );
             add("motion", motion, Class::Laboratory, "published tuning", None);
             let start = format!("{} mm", significant(-start_m * 1e3, 3));
-            add("way in air", start, Class::Ours, "with it the speed at contact", Some(Number::Start));
+            add(
+                "way in air",
+                start,
+                Class::Ours,
+                "with it the speed at contact",
+                Some(AssumedValue::TravelInAir),
+            );
             let why = "a quarter period or less";
             add("duration", format!("{} s", significant(duration_s, 3)), Class::Ours, why, behind);
         }
@@ -203,13 +220,13 @@ pub fn inputs(case: Case, scenario: &Scenario) -> Vec<Input> {
     let noise = format!("{NOISE_MN} mN, white");
     let why =
         "the laboratory's s0 read as the sensor's noise; the laboratory's range 5 to 20 mN is in the tables";
-    add("noise of the force/torque sensor", noise, Class::Ours, why, Some(Number::Noise));
+    add("noise of the force/torque sensor", noise, Class::Ours, why, Some(AssumedValue::Noise));
     if let Some(virtual_sensor) = scenario.sensor.virtual_sensor() {
         add("observer gain", "5 /s".to_owned(), Class::Laboratory, "published tuning", None);
         let noise = format!("{} N m", significant(virtual_sensor.torque_noise_nm, 2));
-        add("noise of the joint torques", noise, Class::Ours, "assumed", Some(Number::TorqueNoise));
+        add("noise of the joint torques", noise, Class::Ours, "assumed", Some(AssumedValue::TorqueNoise));
         let why = "the lower end of the laboratory's range, which is not said to hold for this sensor";
-        add("s1", "0.03 N".to_owned(), Class::Laboratory, why, Some(Number::VirtualSigma));
+        add("s1", "0.03 N".to_owned(), Class::Laboratory, why, Some(AssumedValue::VirtualSigma));
         let why = "the paper's KUKA LWR has no source that can be used";
         add("arm", "Panda, no joint friction".to_owned(), Class::Ours, why, None);
     }
@@ -220,11 +237,11 @@ pub fn inputs(case: Case, scenario: &Scenario) -> Vec<Input> {
 
 /// The table of a figure's inputs.
 #[must_use]
-pub fn table(case: Case, scenario: &Scenario) -> Sourced {
+pub fn table(case: Case, scenario: &Scenario) -> SourcedTable {
     let rows = inputs(case, scenario).into_iter().map(|i| {
         vec![Cell::text(i.name), Cell::text(i.value), Cell::text(i.class.words()), Cell::text(i.why)]
     });
-    Sourced::named(Table {
+    SourcedTable::named(Table {
         title: "What went in".to_owned(),
         headers: ["number", "value", "whose", "source or reason"].map(String::from).to_vec(),
         rows: rows.collect(),
@@ -234,7 +251,7 @@ pub fn table(case: Case, scenario: &Scenario) -> Sourced {
 
 /// The inputs of several experiments in one table, without repeating common values.
 #[must_use]
-pub fn table_of(cases: &[Case]) -> Sourced {
+pub fn table_of(cases: &[Case]) -> SourcedTable {
     let mut all: Vec<(Input, Vec<&str>)> = Vec::new();
     for case in cases {
         let Ok(scenario) = case.scenario() else { continue };
@@ -255,7 +272,7 @@ pub fn table_of(cases: &[Case]) -> Sourced {
             Cell::text(i.why),
         ]
     });
-    Sourced::named(Table {
+    SourcedTable::named(Table {
         title: "What went in".to_owned(),
         headers: ["number", "of", "value", "whose", "source or reason"].map(String::from).to_vec(),
         rows: rows.collect(),
@@ -280,8 +297,9 @@ mod tests {
                 assert_ne!(input.class, Class::Computed, "{case:?} {}", input.name);
                 assert!(
                     input
-                        .number
-                        .is_none_or(|n| matches!(n, Number::Noise | Number::VirtualSigma) || n.enters(case)),
+                        .assumed_value
+                        .is_none_or(|n| matches!(n, AssumedValue::Noise | AssumedValue::VirtualSigma)
+                            || n.enters(case)),
                     "{case:?}"
                 );
             }

@@ -23,10 +23,10 @@ fn worst_stiffness(runs: &[Outcome]) -> f64 {
 }
 
 #[test]
-fn to_the_letter_the_estimates_are_worse_and_the_derivative_may_act_on_drops() {
-    let asking = Study::asking(1, 8);
-    let _ = look(&asking);
-    let found = look(&Study::run(&asking.plan(), &|| {}).expect("shipped scenarios"));
+fn the_literal_algorithm_estimates_worse_and_its_derivative_may_act_on_drops() {
+    let planning = Study::planning(1, 8);
+    let _ = look(&planning);
+    let found = look(&Study::run(&planning.plan(), &|| {}).expect("shipped scenarios"));
     for (setup, of_setup) in SETUPS.iter().zip(&found) {
         for (case, runs) in CASES.iter().zip(of_setup) {
             let all = runs.iter().filter(|o| o.found_all()).count();
@@ -53,9 +53,9 @@ fn to_the_letter_the_estimates_are_worse_and_the_derivative_may_act_on_drops() {
 #[test]
 fn where_the_drop_is_small_the_derivative_on_drops_finds_none_of_what_the_rising_force_finds() {
     let of = |study: &Study, setup: Setup| View::primary(study).setup(setup).ml(Case::Gel50Constant).to_vec();
-    let asking = Study::asking(1, 8);
-    let _ = (of(&asking, Setup::Tuned), of(&asking, Setup::FallingForce));
-    let study = Study::run(&asking.plan(), &|| {}).expect("shipped scenarios");
+    let planning = Study::planning(1, 8);
+    let _ = (of(&planning, Setup::Tuned), of(&planning, Setup::FallingForce));
+    let study = Study::run(&planning.plan(), &|| {}).expect("shipped scenarios");
     let (rising, falling) = (of(&study, Setup::Tuned), of(&study, Setup::FallingForce));
     assert_eq!((rising.len(), falling.len()), (8, 8));
     assert!(rising.iter().all(Outcome::found_all));

@@ -85,7 +85,7 @@ impl ArmConfig {
         let at = |z: f64| start.position_m + direction * (z - first.position_m);
         let follow = |to_m: f64, near: &JointVector<7>, part: &str| {
             feasibility::follow_line(&arm, &start, &at(to_m), near, &config).map_err(|error| {
-                let remedy = match root(&error) {
+                let remedy = match root_cause(&error) {
                     Error::Singular { .. } | Error::Jump { .. } => "start from other joint angles",
                     Error::JointLimit { .. } => "move more slowly or start from other joint angles",
                     _ => "start nearer to the middle of the arm's reach, or move less far",
@@ -152,9 +152,9 @@ impl ArmConfig {
     }
 }
 
-fn root(error: &Error) -> &Error {
+fn root_cause(error: &Error) -> &Error {
     match error {
-        Error::Line { reason, .. } => root(reason),
+        Error::Line { reason, .. } => root_cause(reason),
         other => other,
     }
 }

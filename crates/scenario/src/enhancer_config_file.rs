@@ -19,7 +19,7 @@ use stylet_tissue::{AnyEffect, Tissue};
 ///
 /// In a file the fields are flat, `Enhance(surface_m: 0.01, contact: Known, model: MultiLayer)`; a scenario file is accepted as well.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(from = "Flat", into = "Flat")]
+#[serde(from = "FlatFields", into = "FlatFields")]
 pub struct EnhancerConfigFile {
     /// Position of the surface in m, for `contact: Known`.
     pub surface_m: f64,
@@ -94,7 +94,7 @@ fn is_scenario(text: &str) -> bool {
 /// Form in the file: the fields of [`EnhanceConfig`] and the surface.
 #[derive(Serialize, Deserialize)]
 #[serde(rename = "Enhance", default, deny_unknown_fields)]
-struct Flat {
+struct FlatFields {
     surface_m: f64,
     algorithm: Algorithm,
     model: Model,
@@ -112,7 +112,7 @@ struct Flat {
     stylet: StyletConfig,
 }
 
-impl Default for Flat {
+impl Default for FlatFields {
     fn default() -> Self {
         EnhancerConfigFile::default().into()
     }
@@ -120,13 +120,13 @@ impl Default for Flat {
 
 macro_rules! convert {
     ($($field:ident),*) => {
-        impl From<Flat> for EnhancerConfigFile {
-            fn from(Flat { surface_m, $($field),* }: Flat) -> Self {
+        impl From<FlatFields> for EnhancerConfigFile {
+            fn from(FlatFields { surface_m, $($field),* }: FlatFields) -> Self {
                 Self { surface_m, enhance: EnhanceConfig { $($field),* } }
             }
         }
 
-        impl From<EnhancerConfigFile> for Flat {
+        impl From<EnhancerConfigFile> for FlatFields {
             fn from(EnhancerConfigFile { surface_m, enhance: EnhanceConfig { $($field),* } }: EnhancerConfigFile) -> Self {
                 Self { surface_m, $($field),* }
             }

@@ -41,13 +41,13 @@ impl InputError {
         let before = &text[..start];
         let line = before.matches('\n').count() + 1;
         let column = before.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
-        let shown = fits_a_screen(text, start, end);
+        let is_shown = fits_on_screen(text, start, end);
         Self {
             location: format!("{file}:{line}:{column}"),
             message: what.into(),
             position: Some((line, column)),
-            source_code: shown.then(|| Arc::new(NamedSource::new(file, text.to_owned()))),
-            span: shown.then(|| SourceSpan::new(start.into(), end - start)),
+            source_code: is_shown.then(|| Arc::new(NamedSource::new(file, text.to_owned()))),
+            span: is_shown.then(|| SourceSpan::new(start.into(), end - start)),
         }
     }
 }
@@ -58,7 +58,7 @@ const MAX_SHOWN_LINE_BYTES: usize = 1000;
 const CONTEXT_LINES: usize = 1;
 
 /// Whether the lines around the bytes `start..end` are short enough to be shown.
-fn fits_a_screen(text: &str, start: usize, end: usize) -> bool {
+fn fits_on_screen(text: &str, start: usize, end: usize) -> bool {
     let first = text[..start].matches('\n').count().saturating_sub(CONTEXT_LINES);
     let last = text[..end].matches('\n').count() + CONTEXT_LINES;
     text.split('\n').take(last + 1).skip(first).all(|line| line.len() <= MAX_SHOWN_LINE_BYTES)

@@ -52,13 +52,13 @@ impl Serialize for ObserverGain {
 
 impl<'de> Deserialize<'de> for ObserverGain {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(OneOrSeven)
+        deserializer.deserialize_any(GainVisitor)
     }
 }
 
-struct OneOrSeven;
+struct GainVisitor;
 
-impl<'de> Visitor<'de> for OneOrSeven {
+impl<'de> Visitor<'de> for GainVisitor {
     type Value = ObserverGain;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

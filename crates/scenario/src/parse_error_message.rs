@@ -106,10 +106,10 @@ impl ErrorLocation<'_> {
                 "this is a `{found}`, where a `{expected}` is expected; write `{expected}(...)`"
             )),
             Error::Eof | Error::ExpectedStructLikeEnd | Error::ExpectedArrayEnd if self.at_end() => {
-                self.ends()
+                self.unexpected_end()
             }
-            Error::ExpectedStructLike | Error::ExpectedNamedStructLike(_) => self.no_bracket(),
-            Error::ExpectedComma => self.comma(),
+            Error::ExpectedStructLike | Error::ExpectedNamedStructLike(_) => self.missing_bracket(),
+            Error::ExpectedComma => self.missing_comma(),
             Error::ExpectedFloat => self.wrong("a number, for example `0.5`,"),
             Error::ExpectedBoolean => self.wrong("`true` or `false`"),
             Error::ExpectedString => self.wrong("text in double quotes"),
@@ -168,8 +168,8 @@ impl ErrorLocation<'_> {
         match on(self.start).or_else(|| on(self.end)) {
             Some(entry) => {
                 let value = self.text[entry.start..entry.end].lines().next().unwrap_or_default();
-                let shown: String = value.chars().take(40).collect();
-                let what = format!("{}: is `{shown}`, where {expected} is expected", entry.path);
+                let excerpt: String = value.chars().take(40).collect();
+                let what = format!("{}: is `{excerpt}`, where {expected} is expected", entry.path);
                 (entry.start, entry.start + value.len(), what)
             }
             _ => (self.start, self.end, format!("{expected} is expected here")),
@@ -177,7 +177,7 @@ impl ErrorLocation<'_> {
     }
 
     /// A name without its brackets, or another token where brackets are expected.
-    fn no_bracket(&self) -> (usize, usize, String) {
+    fn missing_bracket(&self) -> (usize, usize, String) {
         let before = self.start.saturating_sub(1);
         let name = tokenize(self.text).into_iter().find(|t| t.start <= before && before < t.end);
         match name {
@@ -210,9 +210,9 @@ impl ErrorLocation<'_> {
         Some((start, end, what))
     }
 
-    fn comma(&self) -> (usize, usize, String) {
+    fn missing_comma(&self) -> (usize, usize, String) {
         if self.at_end() {
-            return self.ends();
+            return self.unexpected_end();
         }
         let rest = &self.text[self.start.min(self.text.len())..];
         if rest.starts_with('.') {
@@ -240,7 +240,7 @@ impl ErrorLocation<'_> {
     }
 
     /// The text ends too early.
-    fn ends(&self) -> (usize, usize, String) {
+    fn unexpected_end(&self) -> (usize, usize, String) {
         match self.outline.open_brackets.last() {
             Some(open) => {
                 let close = if self.text[*open..].starts_with('[') { ']' } else { ')' };

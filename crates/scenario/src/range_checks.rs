@@ -8,12 +8,12 @@ pub(crate) fn check(path: impl Into<String>, value: f64, ok: bool, right: &str) 
     if ok && value.is_finite() {
         Ok(())
     } else {
-        Err(FieldError::new(path, format!("is {}; {right}", shown(value))))
+        Err(FieldError::new(path, format!("is {}; {right}", number_text(value))))
     }
 }
 
 /// A number as text; very large and small ones with an exponent instead of hundreds of digits.
-pub(crate) fn shown(value: f64) -> String {
+pub(crate) fn number_text(value: f64) -> String {
     let size = value.abs();
     if size != 0.0 && !(1e-6..1e9).contains(&size) { format!("{value:e}") } else { value.to_string() }
 }
@@ -43,9 +43,12 @@ mod tests {
     #[test]
     fn a_number_of_any_size_is_shown_in_few_characters() {
         for value in [1e300, -1e308, 5e-324, f64::INFINITY, f64::NAN, 0.0, 0.25, 123_456_789.0] {
-            assert!(shown(value).len() < 12, "{}", shown(value));
+            assert!(number_text(value).len() < 12, "{}", number_text(value));
         }
-        assert_eq!((shown(1e300), shown(-0.02), shown(0.0)), ("1e300".into(), "-0.02".into(), "0".into()));
+        assert_eq!(
+            (number_text(1e300), number_text(-0.02), number_text(0.0)),
+            ("1e300".into(), "-0.02".into(), "0".into())
+        );
     }
 
     #[test]

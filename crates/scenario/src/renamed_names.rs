@@ -33,38 +33,38 @@ const FLAGS: &[(&str, &str)] = &[
     ("judge", "score"),
 ];
 
-fn look_up(names: &'static [(&str, &str)], old: &str) -> Option<&'static str> {
+fn new_name_of(names: &'static [(&str, &str)], old: &str) -> Option<&'static str> {
     names.iter().find(|(name, _)| *name == old).map(|(_, new)| *new)
 }
 
-fn sentence(old: &str, new: &str) -> String {
+fn renamed_sentence(old: &str, new: &str) -> String {
     format!("`{old}` is called `{new}` since 0.2")
 }
 
 /// "`LetGo` is called `ReleaseDepth` since 0.2" for an old name of a field or an effect, if the new one is among `expected`.
 #[must_use]
 pub fn renamed_ron_name(old: &str, expected: &[&str]) -> Option<String> {
-    let new = look_up(RON_NAMES, old)?;
-    expected.contains(&new).then(|| sentence(old, new))
+    let new = new_name_of(RON_NAMES, old)?;
+    expected.contains(&new).then(|| renamed_sentence(old, new))
 }
 
 /// The same for the parts of a path such as `enhance.stylet.law`.
 #[must_use]
 pub fn renamed_path(path: &str) -> Option<String> {
-    path.split(['.', '[', ']']).find_map(|part| Some(sentence(part, look_up(RON_NAMES, part)?)))
+    path.split(['.', '[', ']']).find_map(|part| Some(renamed_sentence(part, new_name_of(RON_NAMES, part)?)))
 }
 
 /// The same for an old key in the text of a JSON file.
 #[must_use]
 pub fn renamed_json_key(text: &str) -> Option<String> {
     let (old, new) = JSON_KEYS.iter().find(|(old, _)| text.contains(&format!("\"{old}\":")))?;
-    Some(sentence(old, new))
+    Some(renamed_sentence(old, new))
 }
 
 /// The same for a flag or a command.
 #[must_use]
 pub fn renamed_flag(old: &str) -> Option<String> {
-    Some(sentence(old, look_up(FLAGS, old)?))
+    Some(renamed_sentence(old, new_name_of(FLAGS, old)?))
 }
 
 #[cfg(test)]

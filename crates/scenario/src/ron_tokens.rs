@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn what_never_ends_ends_with_the_text() {
+    fn an_unterminated_string_or_comment_ends_with_the_text() {
         assert_eq!(words("a \"bc\\"), ["a", "\"bc\\"]);
         assert_eq!(words("a r##\"b\"#"), ["a", "r##\"b\"#"]);
         assert_eq!(words("a /* b /* c */"), ["a"]);

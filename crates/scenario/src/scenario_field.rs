@@ -82,7 +82,7 @@ impl ScenarioField {
                     };
                     if !fields.contains_key(name) {
                         let mut known: Vec<String> = fields.keys().cloned().collect();
-                        let optional = known_here(scenario, &steps[..depth]);
+                        let optional = fields_at_level(scenario, &steps[..depth]);
                         known.extend(
                             optional.iter().filter(|k| !fields.contains_key(*k)).cloned().collect::<Vec<_>>(),
                         );
@@ -263,7 +263,7 @@ fn content(fields: &Map<String, Value>) -> &Map<String, Value> {
 
 /// All fields of the schema at a level, missing optional ones included: deserialising an unknown field makes serde list the known
 /// ones.
-fn known_here(scenario: &Scenario, steps: &[Step]) -> Vec<String> {
+fn fields_at_level(scenario: &Scenario, steps: &[Step]) -> Vec<String> {
     let Ok(mut tree) = serde_json::to_value(scenario) else { return Vec::new() };
     let mut place = &mut tree;
     for step in steps {

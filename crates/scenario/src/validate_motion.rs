@@ -2,7 +2,7 @@
 
 use crate::load_ron::FieldError;
 use crate::motion::{Motion, Segment};
-use crate::range_checks::{CheckResult, check, finite, positive, shown};
+use crate::range_checks::{CheckResult, check, finite, number_text, positive};
 use crate::scenario::Scenario;
 
 /// Larger numbers of samples or physics steps are rejected as typing errors.
@@ -44,15 +44,15 @@ pub(crate) fn motion(s: &Scenario) -> CheckResult {
                 return Err(FieldError::new("motion.segments", what));
             }
             for (i, segment) in segments.iter().enumerate() {
-                one_segment(&format!("motion.segments[{i}]"), segment, s.sample_hz)?;
+                check_segment(&format!("motion.segments[{i}]"), segment, s.sample_hz)?;
             }
         }
         Motion::Recorded => {}
     }
-    reaches(s)
+    reaches_tissue(s)
 }
 
-fn one_segment(at: &str, segment: &Segment, sample_hz: f64) -> CheckResult {
+fn check_segment(at: &str, segment: &Segment, sample_hz: f64) -> CheckResult {
     positive(format!("{at}.duration_s"), segment.duration_s(), "seconds")?;
     match *segment {
         Segment::Move { velocity_mps, .. } => speed(format!("{at}.velocity_mps"), velocity_mps),
@@ -76,7 +76,7 @@ fn frequency(path: String, value: f64, sample_hz: f64) -> CheckResult {
 }
 
 /// The motion must fit into memory and reach the tissue.
-fn reaches(s: &Scenario) -> CheckResult {
+fn reaches_tissue(s: &Scenario) -> CheckResult {
     let Some(plan) = s.motion.plan() else {
         return Ok(());
     };
@@ -85,8 +85,8 @@ fn reaches(s: &Scenario) -> CheckResult {
         let what = format!(
             "makes {samples:.3e} samples in {} s at {} Hz; at most {MAX_SAMPLES:.0e} are simulated: \
              shorten it or lower sample_hz",
-            shown(seconds),
-            shown(s.sample_hz)
+            number_text(seconds),
+            number_text(s.sample_hz)
         );
         return Err(FieldError::new("motion", what));
     }
@@ -97,9 +97,9 @@ fn reaches(s: &Scenario) -> CheckResult {
     if seconds * s.physics_hz > MAX_PHYSICS_STEPS {
         let what = format!(
             "is {}, which makes {:.3e} steps in {} s; at most {MAX_PHYSICS_STEPS:.0e} are simulated: lower it",
-            shown(s.physics_hz),
+            number_text(s.physics_hz),
             seconds * s.physics_hz,
-            shown(seconds)
+            number_text(seconds)
         );
         return Err(FieldError::new("physics_hz", what));
     }

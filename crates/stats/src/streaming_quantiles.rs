@@ -38,18 +38,18 @@ pub fn quantiles_of_stream<E>(
     let ranks = places.iter().flatten().flat_map(|(below, share)| {
         [Some(*below as u64), (*share > 0.0).then_some(*below as u64 + 1)].into_iter().flatten()
     });
-    let mut sought = Sought::default();
-    ranks.for_each(|rank| sought.narrow(&first, 0, 0, rank, rank));
+    let mut search = RankSearch::default();
+    ranks.for_each(|rank| search.narrow(&first, 0, 0, rank, rank));
     drop(first);
-    while !sought.open.is_empty() {
-        let mut open = std::mem::take(&mut sought.open);
+    while !search.open.is_empty() {
+        let mut open = std::mem::take(&mut search.open);
         pass(&mut |x| open.iter_mut().for_each(|range| range.add(key(x))))?;
         for range in open {
-            range.close(&mut sought);
+            range.close(&mut search);
         }
     }
     let at = |rank: usize| {
-        let found = sought.found.iter().find(|(of, _)| *of == rank as u64);
+        let found = search.found.iter().find(|(of, _)| *of == rank as u64);
         found.map_or(f64::NAN, |(_, key)| value_of(*key))
     };
     let value = |place: &Option<(usize, f64)>| match *place {
@@ -93,10 +93,10 @@ struct Range {
     known: u32,
     /// The rank among all, and among these.
     ranks: Vec<(u64, u64)>,
-    within: Within,
+    within: RangeRefinement,
 }
 
-enum Within {
+enum RangeRefinement {
     Many(Histogram),
     Few(Vec<u64>),
 }
@@ -106,36 +106,36 @@ impl Range {
     fn add(&mut self, key: u64) {
         if (key ^ self.first) >> (64 - self.known) == 0 {
             match &mut self.within {
-                Within::Many(histogram) => histogram.add(key, self.known),
-                Within::Few(keys) => keys.push(key),
+                RangeRefinement::Many(histogram) => histogram.add(key, self.known),
+                RangeRefinement::Few(keys) => keys.push(key),
             }
         }
     }
 
-    fn close(self, sought: &mut Sought) {
+    fn close(self, search: &mut RankSearch) {
         match self.within {
-            Within::Many(histogram) => {
+            RangeRefinement::Many(histogram) => {
                 for (rank, here) in self.ranks {
-                    sought.narrow(&histogram, self.first, self.known, rank, here);
+                    search.narrow(&histogram, self.first, self.known, rank, here);
                 }
             }
-            Within::Few(mut keys) => {
+            RangeRefinement::Few(mut keys) => {
                 keys.sort_unstable();
                 let here = |at: u64| keys.get(at as usize).copied().unwrap_or_default();
-                sought.found.extend(self.ranks.iter().map(|(rank, at)| (*rank, here(*at))));
+                search.found.extend(self.ranks.iter().map(|(rank, at)| (*rank, here(*at))));
             }
         }
     }
 }
 
 #[derive(Default)]
-struct Sought {
+struct RankSearch {
     open: Vec<Range>,
     /// Ranks and their keys.
     found: Vec<(u64, u64)>,
 }
 
-impl Sought {
+impl RankSearch {
     /// Narrows the search to the bin that contains the rank, which is the rank `here` within the range.
     fn narrow(&mut self, histogram: &Histogram, first: u64, known: u32, rank: u64, mut here: u64) {
         for (bin, count) in histogram.0.iter().enumerate() {
@@ -151,7 +151,11 @@ impl Sought {
                 range.ranks.push((rank, here));
             } else {
                 let few = *count <= MAX_IN_MEMORY as u64 / 2;
-                let within = if few { Within::Few(Vec::new()) } else { Within::Many(Histogram::default()) };
+                let within = if few {
+                    RangeRefinement::Few(Vec::new())
+                } else {
+                    RangeRefinement::Many(Histogram::default())
+                };
                 self.open.push(Range { first, known, ranks: vec![(rank, here)], within });
             }
             return;

@@ -4,7 +4,7 @@ use crate::messages::*;
 use crate::phantom_view::view;
 use crate::preview::preview;
 use crate::studio::{Snapshot, Studio};
-use crate::{explain, look, open, phantom};
+use crate::{column_assignment, diagnosis_jobs, online_algorithm, phantom};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -19,32 +19,32 @@ impl Studio {
         match name {
             "state" => json(self.state()?),
             "library" => json(phantom::library()),
-            "inspect" => json(open::inspect(self, &required(body)?)?),
-            "column" => json(open::set_column(self, parse(body)?)?),
-            "rate" => json(open::set_rate(self, parse(body)?)?),
-            "forget_map" => json(open::forget_map(self)?),
+            "inspect" => json(column_assignment::inspect(self, &required(body)?)?),
+            "column" => json(column_assignment::set_column(self, parse(body)?)?),
+            "rate" => json(column_assignment::set_rate(self, parse(body)?)?),
+            "forget_map" => json(column_assignment::reset_map(self)?),
             "remove" => {
                 self.workspace.remove(&required(body)?)?;
-                self.forget_recordings();
+                self.unload_recordings();
                 json(self.state()?)
             }
-            "look" => json(look::look(self, parse(body)?)?),
-            "enhance" => json(look::write_enhancement(self, parse(body)?)?),
+            "look" => json(online_algorithm::recording_view(self, parse(body)?)?),
+            "enhance" => json(online_algorithm::write_enhancement(self, parse(body)?)?),
             "preview" => json(preview(self, parse::<FileRequest>(body)?.file.as_deref(), false)?),
             "edit" => json(self.edit(parse(body)?)?),
-            "undo" => json(self.step_back(true)?),
-            "redo" => json(self.step_back(false)?),
+            "undo" => json(self.undo_or_redo(true)?),
+            "redo" => json(self.undo_or_redo(false)?),
             "save" => json(phantom::save(self)?),
             "run" => json(phantom::run(self)?),
-            "diagnose" => json(explain::start_diagnosis(self, parse(body)?)?),
-            "plan" => json(explain::start_plan(self, parse(body)?)?),
-            "predict" => json(explain::start_prediction(self, parse(body)?)?),
+            "diagnose" => json(diagnosis_jobs::start_diagnosis(self, parse(body)?)?),
+            "plan" => json(diagnosis_jobs::start_plan(self, parse(body)?)?),
+            "predict" => json(diagnosis_jobs::start_prediction(self, parse(body)?)?),
             "job" => json(self.job.as_ref().map(|job| job.view())),
             "cancel" => {
                 self.job.iter_mut().for_each(|job| job.cancel());
                 json(self.job.as_ref().map(|job| job.view()))
             }
-            "causes" => json(explain::without_causes(self, parse(body)?)?),
+            "causes" => json(diagnosis_jobs::without_causes(self, parse(body)?)?),
             _ => Err(Problem::new(format!("there is no message {name:?}"))),
         }
     }
@@ -55,9 +55,9 @@ impl Studio {
     /// When it cannot be stored.
     pub fn add_file(&mut self, name: &str, from: &Path) -> Result<Vec<u8>, Problem> {
         let name = self.workspace.add(name, from)?;
-        self.forget_recordings();
-        open::adopt_proposal(self, &name)?;
-        let found = open::inspect(self, &name);
+        self.unload_recordings();
+        column_assignment::adopt_proposal(self, &name)?;
+        let found = column_assignment::inspect(self, &name);
         if found.is_err() {
             // No data for the page.
             self.workspace.remove(&name)?;
@@ -82,7 +82,7 @@ impl Studio {
 
     fn collect_job(&mut self) {
         if let Some(result) = self.job.as_mut().and_then(|job| job.take_result()) {
-            explain::collect(self, result);
+            diagnosis_jobs::collect(self, result);
         }
     }
 }

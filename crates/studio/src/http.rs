@@ -53,7 +53,7 @@ pub struct Limits {
 }
 
 /// Request extension that ends the connection.
-pub type Closing = Arc<OnceLock<AbortHandle>>;
+pub type ConnectionAbortHandle = Arc<OnceLock<AbortHandle>>;
 
 /// Access rules for requests.
 pub struct Access {
@@ -134,7 +134,7 @@ async fn accept(listener: tokio::net::TcpListener, router: Router, limits: Limit
             tokio::spawn(timeout(REFUSAL_TIMEOUT, refuse(stream)));
             continue;
         };
-        let closing = Closing::default();
+        let closing = ConnectionAbortHandle::default();
         let service = TowerToHyperService::new(router.clone().layer(Extension(closing.clone())));
         let connection = http.serve_connection(TokioIo::new(stream), service);
         let task = tokio::spawn(async move {

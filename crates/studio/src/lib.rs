@@ -1,26 +1,26 @@
 #![doc = include_str!("../README.md")]
 #![forbid(unsafe_code)]
 
+mod background_job;
+mod column_assignment;
 mod commands;
+mod diagnosis_jobs;
 mod dispatch;
-mod explain;
 mod http;
-mod job;
-mod live;
-mod look;
+mod live_server;
 mod messages;
-mod open;
+mod online_algorithm;
 mod page;
 mod phantom;
 mod phantom_view;
 mod preview;
-mod results;
 mod server;
 mod sliders;
 mod studio;
 mod workspace;
+mod workspace_results;
 
-pub use live::LiveServer;
+pub use live_server::LiveServer;
 pub use messages::Problem;
 pub use server::Server;
 pub use studio::Studio;

@@ -196,7 +196,7 @@ pub struct Corrections {
 /// Request for the online algorithm on a recording.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct LookRequest {
+pub struct RecordingViewRequest {
     pub file: String,
     pub algorithms: Vec<String>,
     #[serde(default)]
@@ -208,7 +208,7 @@ pub struct LookRequest {
 
 /// A recording with the outputs of the online algorithm.
 #[derive(Debug, Serialize)]
-pub struct LookView {
+pub struct RecordingView {
     pub file: String,
     pub summary: String,
     pub findings: Vec<FindingView>,

@@ -1,12 +1,12 @@
 //! Edits of the phantom, a scenario that is changed with the mouse.
 
-use crate::look::MIN_THICKNESS_M;
 use crate::messages::*;
+use crate::online_algorithm::MIN_THICKNESS_M;
 use crate::phantom_view::{SCENARIOS, first, parse, title, tolerance};
 use crate::sliders::{Scale, rounded};
 use crate::studio::Studio;
 use crate::workspace::PHANTOM;
-use crate::{commands, look};
+use crate::{commands, online_algorithm};
 use serde_json::{Value, json};
 use stylet_scenario::{Motion, Scenario, Segment};
 use stylet_score::{FoundLayer, found_layers};
@@ -19,7 +19,7 @@ const APPROACH_M: f64 = 5e-3;
 /// Speed of the library's motions, in m/s.
 const SPEED_MPS: f64 = 2.5e-3;
 /// Depth below the last layer's start that is added to layers found in a recording, relative to the layer, and at least in m.
-const BEYOND: (f64, f64) = (0.2, 5e-3);
+const DEPTH_BEYOND_LAST_LAYER: (f64, f64) = (0.2, 5e-3);
 
 const MOTIONS: [(&str, &str); 3] = [
     ("constant", "one constant speed"),
@@ -32,7 +32,7 @@ pub fn library() -> Value {
     let entry = |e: &EffectInfo| json!({ "id": e.id, "title": title(e.id), "equation": e.equation, "signature": e.signature });
     json!({
         "scenarios": SCENARIOS.map(|(name, _)| name),
-        "algorithms": look::ALGORITHMS.map(|(name, _)| name),
+        "algorithms": online_algorithm::ALGORITHMS.map(|(name, _)| name),
         "motions": MOTIONS,
         "effects": general_effects().chain(per_layer_effects()).map(entry).collect::<Value>(),
     })
@@ -106,8 +106,8 @@ pub fn edited(studio: &mut Studio, edit: &Edit) -> Result<Scenario, Problem> {
         Edit::FromRecording { file, algorithm, corrections } => {
             scenario = from_recording(studio, file, algorithm, corrections)?;
         }
-        Edit::FromDiagnosis => scenario = studio.explained.extended()?,
-        Edit::FromPlan => scenario.motion = studio.explained.planned_motion()?,
+        Edit::FromDiagnosis => scenario = studio.results.extended()?,
+        Edit::FromPlan => scenario.motion = studio.results.planned_motion()?,
         Edit::Ron { text } => scenario = parse(PHANTOM, text)?,
     }
     scenario.check()?;
@@ -189,9 +189,9 @@ fn from_recording(
     corrections: &Corrections,
 ) -> Result<Scenario, Problem> {
     let loaded = studio.recording(file)?;
-    let run = look::run_algorithm(studio, file, algorithm, corrections.contact_mm)?;
+    let run = online_algorithm::run_algorithm(studio, file, algorithm, corrections.contact_mm)?;
     let recording = &loaded.recording;
-    let trace = look::corrected_trace(algorithm, &run, corrections, recording);
+    let trace = online_algorithm::corrected_trace(algorithm, &run, corrections, recording);
     let found = found_layers(&trace, recording);
     let found = found.filter(|found| !found.is_empty()).ok_or_else(|| {
         Problem::new(
@@ -203,7 +203,10 @@ fn from_recording(
     let (deepest, end_m) = deepest.map_or((0, 0.0), |(index, s)| (index, s.position_m));
     let surface_m = found[0].front_m;
     if let Some(last) = layers.last_mut().filter(|_| found.last().is_some_and(|l| l.rupture_m.is_none())) {
-        last.thickness_m = rounded(last.thickness_m + (BEYOND.0 * (end_m - surface_m)).max(BEYOND.1));
+        last.thickness_m = rounded(
+            last.thickness_m
+                + (DEPTH_BEYOND_LAST_LAYER.0 * (end_m - surface_m)).max(DEPTH_BEYOND_LAST_LAYER.1),
+        );
     }
     let start_m = recording.position_m.first().copied().unwrap_or(0.0);
     let duration_s = recording.time_s[deepest] - recording.time_s[0];
@@ -222,7 +225,7 @@ fn from_recording(
 
 /// Writes phantom and map.
 pub fn save(studio: &mut Studio) -> Result<Value, Problem> {
-    studio.keep()?;
+    studio.save_workspace()?;
     let command = commands::open_again(studio.folder());
     studio.workspace.record(command)?;
     studio.state()
@@ -230,7 +233,7 @@ pub fn save(studio: &mut Studio) -> Result<Value, Problem> {
 
 /// `stylet run` of the phantom.
 pub fn run(studio: &mut Studio) -> Result<Value, Problem> {
-    studio.keep()?;
+    studio.save_workspace()?;
     let file = studio.workspace.path(PHANTOM);
     let name = file.display().to_string();
     // As the command reads it.

@@ -5,7 +5,7 @@ use crate::phantom_view::millimetres;
 use crate::studio::Studio;
 use stylet_api::{Recording, Scenario, force_along_motion};
 use stylet_report::significant;
-use stylet_report::{kept_indices, pick};
+use stylet_report::{kept_indices, values_at};
 use stylet_scenario::{ForceTorque, Robot, Sensor};
 use stylet_tissue::{ForceLaw, Rupture, replay};
 
@@ -101,10 +101,10 @@ pub fn curves(recording: &Recording, forces: &[(&'static str, &str, &[f64])], po
     let all = || (0..recording.len()).collect();
     let kept = kept_indices(&columns, recording.len(), points).unwrap_or_else(all);
     let small = |column: &[f64], factor: f64| -> Vec<f32> {
-        pick(column, &kept).into_iter().map(|v| (v * factor) as f32).collect()
+        values_at(column, &kept).into_iter().map(|v| (v * factor) as f32).collect()
     };
     Curves {
-        time_s: pick(&recording.time_s, &kept),
+        time_s: values_at(&recording.time_s, &kept),
         depth_mm: small(&recording.position_m, 1e3),
         velocity_mm_per_s: small(&recording.velocity_mps, 1e3),
         forces: forces

@@ -3,8 +3,8 @@
 
 use crate::messages::*;
 use crate::phantom_view::{self, view};
-use crate::results::{Explained, Job, limits};
 use crate::workspace::{MAP, PHANTOM, Workspace};
+use crate::workspace_results::{Job, WorkspaceResults, limits};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,7 +17,7 @@ const MAX_UNDO: usize = 100;
 const MAX_LOADED: usize = 4;
 
 /// A recording in memory.
-pub struct Loaded {
+pub struct LoadedRecording {
     pub recording: Recording,
     pub notes: Vec<QualityNote>,
 }
@@ -37,11 +37,11 @@ pub struct Studio {
     pub(crate) redo: Vec<Snapshot>,
     /// Mouse drag of the last edit.
     pub(crate) stroke: Option<u64>,
-    loaded: Vec<(String, Arc<Loaded>)>,
+    loaded: Vec<(String, Arc<LoadedRecording>)>,
     /// Outputs of the online algorithm for the recording shown last.
     pub(crate) enhanced: Vec<(String, Arc<AlgorithmRun>)>,
     pub(crate) job: Option<Job>,
-    pub(crate) explained: Explained,
+    pub(crate) results: WorkspaceResults,
 }
 
 impl Studio {
@@ -56,7 +56,7 @@ impl Studio {
             None => phantom_view::first()?,
         };
         let map = workspace.read(MAP).map(|text| stylet_scenario::parse(MAP, &text)).transpose()?;
-        let explained = Explained::read(&workspace);
+        let results = WorkspaceResults::read(&workspace);
         let mut studio = Self {
             workspace,
             now: Snapshot { phantom, map },
@@ -66,7 +66,7 @@ impl Studio {
             loaded: Vec::new(),
             enhanced: Vec::new(),
             job: None,
-            explained,
+            results,
         };
         for file in files {
             let file = file.as_ref();
@@ -105,35 +105,35 @@ impl Studio {
             "undo": self.undo.len(),
             "redo": self.redo.len(),
             "job": self.job.as_ref().map(|job| job.view()),
-            "diagnosis": self.explained.diagnosis.as_ref().map(|d| &d.view),
-            "plan": self.explained.plan.as_ref().map(|p| &p.view),
-            "prediction": self.explained.prediction,
+            "diagnosis": self.results.diagnosis.as_ref().map(|d| &d.view),
+            "plan": self.results.plan.as_ref().map(|p| &p.view),
+            "prediction": self.results.prediction,
             "limits": limits(&self.workspace, &self.now.phantom),
         }))
     }
 
     /// Makes an undoable change. A workspace with a folder is updated on disk.
-    pub(crate) fn change(&mut self, to: Snapshot, step: bool, keep: bool) -> Result<(), Problem> {
-        if step && to != self.now {
+    pub(crate) fn change(&mut self, to: Snapshot, undoable: bool, write: bool) -> Result<(), Problem> {
+        if undoable && to != self.now {
             self.undo.push(self.now.clone());
             let surplus = self.undo.len().saturating_sub(MAX_UNDO);
             self.undo.drain(..surplus);
             self.redo.clear();
         }
         self.stroke = None;
-        self.set(to, keep)
+        self.restore(to, write)
     }
 
-    pub(crate) fn set(&mut self, to: Snapshot, keep: bool) -> Result<(), Problem> {
+    pub(crate) fn restore(&mut self, to: Snapshot, write: bool) -> Result<(), Problem> {
         if to.map != self.now.map {
-            self.forget_recordings();
+            self.unload_recordings();
         }
         self.now = to;
-        if keep && self.workspace.exists() { self.keep() } else { Ok(()) }
+        if write && self.workspace.exists() { self.save_workspace() } else { Ok(()) }
     }
 
     /// Writes phantom and map.
-    pub(crate) fn keep(&self) -> Result<(), Problem> {
+    pub(crate) fn save_workspace(&self) -> Result<(), Problem> {
         self.workspace.write(PHANTOM, phantom_view::ron(&self.now.phantom)?.as_bytes())?;
         match &self.now.map {
             Some(map) => self.workspace.write(MAP, map.to_ron().as_bytes()),
@@ -145,18 +145,18 @@ impl Studio {
         }
     }
 
-    pub(crate) fn step_back(&mut self, back: bool) -> Result<Value, Problem> {
+    pub(crate) fn undo_or_redo(&mut self, undo: bool) -> Result<Value, Problem> {
         let (from, to) =
-            if back { (&mut self.undo, &mut self.redo) } else { (&mut self.redo, &mut self.undo) };
+            if undo { (&mut self.undo, &mut self.redo) } else { (&mut self.redo, &mut self.undo) };
         if let Some(snapshot) = from.pop() {
             to.push(self.now.clone());
-            self.set(snapshot, true)?;
+            self.restore(snapshot, true)?;
         }
         self.stroke = None;
         self.state()
     }
 
-    pub(crate) fn forget_recordings(&mut self) {
+    pub(crate) fn unload_recordings(&mut self) {
         self.loaded.clear();
         self.enhanced.clear();
     }
@@ -171,7 +171,7 @@ impl Studio {
     }
 
     /// A recording of the workspace.
-    pub(crate) fn recording(&mut self, file: &str) -> Result<Arc<Loaded>, Problem> {
+    pub(crate) fn recording(&mut self, file: &str) -> Result<Arc<LoadedRecording>, Problem> {
         if let Some((_, loaded)) = self.loaded.iter().find(|(name, _)| name == file) {
             return Ok(loaded.clone());
         }
@@ -179,7 +179,7 @@ impl Studio {
         let Some(NamedRecording { recording, notes, .. }) = read.into_iter().next() else {
             return Err(Problem::new("internal error: nothing was read; please report it"));
         };
-        let loaded = Arc::new(Loaded { recording, notes });
+        let loaded = Arc::new(LoadedRecording { recording, notes });
         if self.loaded.len() >= MAX_LOADED {
             self.loaded.remove(0);
         }

@@ -6,11 +6,11 @@
 #![forbid(unsafe_code)]
 
 pub mod algorithm_comparison;
-mod draw_trial;
 mod failure_rate_bins;
 mod parallel_trials;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod sample_trial;
 mod sampling_design;
 pub mod score_gate;
 pub mod sensitivity;
@@ -22,11 +22,11 @@ mod trial_row;
 pub mod trial_simulation;
 mod trial_table;
 
-pub use draw_trial::{DrawError, DrawnTrial, TrialSampler};
 pub use failure_rate_bins::{BIN_COUNT, FailureMapRow, FailureRateBin, failure_map_rows, failure_rate_bins};
 pub use parallel_trials::{TrialError, run_trials, run_trials_with_threads};
 #[cfg(feature = "parquet")]
 pub use parquet::write_parquet;
+pub use sample_trial::{SampledTrial, SamplingError, TrialSampler};
 pub use sampling_design::{MAX_SOBOL_DIMENSIONS, SamplingDesign, trial_seed};
 pub use stylet_scenario::{Distribution, RandomEffect, Sampling, ScenarioField, SweepFile, VariedField};
 pub use summary::{

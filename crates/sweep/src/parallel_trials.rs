@@ -1,6 +1,6 @@
 //! Runs trials in parallel. Rows are in order and have the same bits for any number of threads.
 
-use crate::draw_trial::{DrawError, TrialSampler};
+use crate::sample_trial::{SamplingError, TrialSampler};
 use crate::sweep_file::Sweep;
 use crate::trial_row::{Columns, TrialRow};
 use crate::trial_simulation::{self, Workspace};
@@ -13,7 +13,7 @@ use stylet_testbed::SimulateError;
 pub enum TrialError {
     /// No draw was valid.
     #[error(transparent)]
-    Draw(#[from] DrawError),
+    Draw(#[from] SamplingError),
     /// The scenario cannot be replayed.
     #[error("trial {trial}: {why}")]
     Simulate {
@@ -45,7 +45,7 @@ pub fn run_trials(
             let first = range.start + chunk * CHUNK;
             let chunk = first..(first + CHUNK).min(range.end);
             let count = chunk.end - chunk.start;
-            let rows = chunk.map(|trial| one(&drawer, columns, trial, workspace)).collect();
+            let rows = chunk.map(|trial| run_trial(&drawer, columns, trial, workspace)).collect();
             done(count);
             rows
         })
@@ -57,7 +57,7 @@ pub fn run_trials(
     Ok(rows)
 }
 
-fn one(
+fn run_trial(
     drawer: &TrialSampler<'_>,
     columns: &Columns,
     trial: u64,

@@ -205,10 +205,20 @@ impl LoadedGate {
     pub fn run(&self, done: &(dyn Fn(u64) + Sync)) -> Result<Vec<GateResult>, TrialError> {
         let columns = Columns::new(&self.sweep);
         let rows = run_trials(&self.sweep, &columns, 0..self.sweep.trials(), done)?;
-        Ok(self.expect.iter().map(|(e, statistic)| self.one(&columns, &rows, e, *statistic)).collect())
+        Ok(self
+            .expect
+            .iter()
+            .map(|(e, statistic)| self.evaluate_expectation(&columns, &rows, e, *statistic))
+            .collect())
     }
 
-    fn one(&self, columns: &Columns, rows: &[TrialRow], e: &Expectation, statistic: Statistic) -> GateResult {
+    fn evaluate_expectation(
+        &self,
+        columns: &Columns,
+        rows: &[TrialRow],
+        e: &Expectation,
+        statistic: Statistic,
+    ) -> GateResult {
         let all = sorted(rows.iter().map(|r| {
             let x = score_value(columns, r, &e.score);
             if e.score.starts_with("contact_m") { x.abs() } else { x }
@@ -248,8 +258,8 @@ pub type Baseline = BTreeMap<String, Interval>;
 
 /// The baseline of these results.
 #[must_use]
-pub fn baseline(judged: &[GateResult]) -> Baseline {
-    judged.iter().filter_map(|j| Some((j.name(), j.found?))).collect()
+pub fn baseline(results: &[GateResult]) -> Baseline {
+    results.iter().filter_map(|j| Some((j.name(), j.found?))).collect()
 }
 
 /// Changes against a baseline, one line each; empty when all values are the same.
@@ -282,14 +292,14 @@ pub fn baseline_changes(old: &Baseline, new: &Baseline) -> Vec<String> {
 
 /// The results as JUnit XML, one test case per bound.
 #[must_use]
-pub fn junit_xml(judged: &[GateResult]) -> String {
+pub fn junit_xml(results: &[GateResult]) -> String {
     let escape = escape_xml;
-    let failures = judged.iter().filter(|j| !j.passed).count();
+    let failures = results.iter().filter(|j| !j.passed).count();
     let mut xml = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n  <testsuite name=\"stylet gate\" tests=\"{}\" failures=\"{failures}\">\n",
-        judged.len()
+        results.len()
     );
-    for j in judged {
+    for j in results {
         let name = escape(&format!("{} {:?}", j.score, j.statistic));
         let class = escape(&j.gate);
         if j.passed {

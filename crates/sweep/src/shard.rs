@@ -65,7 +65,7 @@ pub enum ShardError {
     #[error(
         "{path}: belongs to another {what}: {found} instead of {expected}; remove it and run the shard again"
     )]
-    Foreign {
+    Mismatch {
         /// File.
         path: String,
         /// Property that differs: sweep, version, seed, number of trials, range.
@@ -211,7 +211,7 @@ pub fn read(
     let body = &bytes[end + 1..];
     let expected = header(sweep, columns, number, found.sha256.clone());
     let foreign = |what, found: String, expected: String| {
-        Err(ShardError::Foreign { path: shown.clone(), what, found, expected })
+        Err(ShardError::Mismatch { path: shown.clone(), what, found, expected })
     };
     if found.version != expected.version {
         return foreign("version of Stylet", found.version, expected.version);
@@ -279,7 +279,7 @@ fn split_of(name: &str) -> Option<u64> {
 /// Number of shards according to the file names in the folder.
 ///
 /// # Errors
-/// [`ShardError::None`] without shards, [`ShardError::Foreign`] when files of different splits are mixed.
+/// [`ShardError::None`] without shards, [`ShardError::Mismatch`] when files of different splits are mixed.
 pub fn shard_count(out: &Path) -> Result<u64, ShardError> {
     let folder = out.join(SHARD_FOLDER);
     let mut found: Vec<(u64, String)> = fs::read_dir(&folder)
@@ -295,7 +295,7 @@ pub fn shard_count(out: &Path) -> Result<u64, ShardError> {
         return Err(ShardError::None { path: folder.display().to_string() });
     };
     if first.0 != last.0 {
-        return Err(ShardError::Foreign {
+        return Err(ShardError::Mismatch {
             path: folder.join(&first.1).display().to_string(),
             what: "split",
             found: format!("one of {}", first.0),

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use stylet_stats::{Interval, quantile_interval, sorted, spearman, wilson};
 
 /// Number of worst trials listed.
-const WORST: usize = 20;
+const MAX_WORST_TRIALS: usize = 20;
 
 /// A score over all trials.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -173,7 +173,7 @@ pub fn summarise<T: TrialTable + ?Sized>(
         scores,
         drawn: columns.drawn.clone(),
         worst: worst(columns, rows, replay)?,
-        explained: explained(columns, rows)?,
+        explained: outcome_sensitivities(columns, rows)?,
     })
 }
 
@@ -210,7 +210,7 @@ fn worst<T: TrialTable + ?Sized>(
     let off = |place: usize| if off[place].is_nan() { f64::INFINITY } else { off[place] };
     let mut order: Vec<usize> = (0..rows.count()).collect();
     order.sort_by(|&a, &b| errors[b].total_cmp(&errors[a]).then(off(b).total_cmp(&off(a))).then(a.cmp(&b)));
-    order.truncate(WORST);
+    order.truncate(MAX_WORST_TRIALS);
     let mut worst = Vec::with_capacity(order.len());
     for place in order {
         let r = rows.row(place)?;
@@ -234,7 +234,7 @@ const OUTCOMES: [(&str, &[&str]); 4] = [
     ("enhancement error", &["enhancement.rms_relative"]),
 ];
 
-fn explained<T: TrialTable + ?Sized>(
+fn outcome_sensitivities<T: TrialTable + ?Sized>(
     columns: &Columns,
     rows: &T,
 ) -> Result<Vec<OutcomeSensitivity>, T::Error> {

@@ -1,6 +1,6 @@
 //! The result of a trial as a row: drawn values, then scores, in a fixed order.
 
-use crate::draw_trial::DrawnTrial;
+use crate::sample_trial::SampledTrial;
 use crate::sweep_file::Sweep;
 use stylet_score::{EstimateError, Score};
 use stylet_tissue::Effect;
@@ -29,7 +29,7 @@ pub struct Columns {
 }
 
 /// Scores of the whole trial.
-const WHOLE: [&str; 10] = [
+const TRIAL_SCORES: [&str; 10] = [
     "ruptures",
     "missed",
     "false",
@@ -43,7 +43,7 @@ const WHOLE: [&str; 10] = [
 ];
 
 /// Scores per layer.
-const LAYER: [&str; 4] = [
+const LAYER_SCORES: [&str; 4] = [
     "stiffness_n_per_m.relative_error",
     "friction_ns_per_m2.relative_error",
     "thickness_m.relative_error",
@@ -62,11 +62,11 @@ impl Columns {
             let again = if before > 0 { format!(".{}", before + 1) } else { String::new() };
             drawn.push(format!("effect.{id}{again}"));
         }
-        let mut scores: Vec<String> = WHOLE.iter().map(|s| (*s).to_owned()).collect();
+        let mut scores: Vec<String> = TRIAL_SCORES.iter().map(|s| (*s).to_owned()).collect();
         for layer in 0..layers {
             scores.push(format!("ruptures[{layer}].delay_s"));
             scores.push(format!("ruptures[{layer}].delay_mm"));
-            scores.extend(LAYER.iter().map(|s| format!("layers[{layer}].{s}")));
+            scores.extend(LAYER_SCORES.iter().map(|s| format!("layers[{layer}].{s}")));
         }
         Self { drawn, scores, layers }
     }
@@ -92,7 +92,7 @@ impl Columns {
 
     /// The row of a trial.
     #[must_use]
-    pub fn row(&self, drawn: &DrawnTrial, score: &Score) -> TrialRow {
+    pub fn row(&self, drawn: &SampledTrial, score: &Score) -> TrialRow {
         let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
         let error = |c: &EstimateError| or_nan(c.relative_error);
         let mut values = Vec::with_capacity(self.width());
@@ -120,7 +120,7 @@ impl Columns {
                     error(&l.thickness_m),
                     error(&l.cumulative_friction_ns_per_m),
                 ]),
-                None => values.extend([f64::NAN; LAYER.len()]),
+                None => values.extend([f64::NAN; LAYER_SCORES.len()]),
             }
         }
         TrialRow { trial: drawn.trial, seed: drawn.seed, redrawn: u64::from(drawn.redrawn), values }

@@ -40,7 +40,7 @@ impl Default for Block {
 impl Block {
     /// True and recorded position and velocity from sample `first` on.
     #[inline(never)]
-    fn place(
+    fn fill_motion(
         &mut self,
         plan: &MotionPlan,
         measuring: &ForceSensor,
@@ -62,7 +62,12 @@ impl Block {
 
     /// The tissue force.
     #[inline(never)]
-    fn load(&mut self, law: &ForceLaw, state: &mut ForceLawState, on_rupture: impl FnMut(Rupture)) {
+    fn compute_tissue_force(
+        &mut self,
+        law: &ForceLaw,
+        state: &mut ForceLawState,
+        on_rupture: impl FnMut(Rupture),
+    ) {
         let moments = self.samples.iter().zip(&self.points).take(self.count);
         let moments = moments.map(|(s, at)| [s.time_s, at.position_m, at.velocity_mps]);
         let mut forces = self.total_n.iter_mut().zip(&mut self.tip_n);
@@ -104,13 +109,13 @@ impl Block {
         for ((sample, enhanced), (at, (tip_n, total_n))) in
             self.samples.iter().zip(&self.enhanced).zip(truth).take(self.count)
         {
-            let moment = TrueSample {
+            let sample_truth = TrueSample {
                 position_m: at.position_m,
                 force_n: sample.force_n,
                 tip_n: *tip_n,
                 total_n: *total_n,
             };
-            scorer.add_sample(&moment, enhanced);
+            scorer.add_sample(&sample_truth, enhanced);
         }
     }
 }
@@ -165,8 +170,8 @@ pub fn run_with_sampling_phase(
     let mut state = ForceLawState::default();
     let mut block = Block::default();
     for first in (0..rates.samples).step_by(BLOCK_SAMPLES) {
-        block.place(&plan, &measuring, &rates, first, start_offset_s);
-        block.load(&law, &mut state, |r| ruptures.push(r));
+        block.fill_motion(&plan, &measuring, &rates, first, start_offset_s);
+        block.compute_tissue_force(&law, &mut state, |r| ruptures.push(r));
         block.measure(&mut measuring);
         block.enhance(&mut core, &mut scorer);
         block.score(&mut scorer);

@@ -1,7 +1,7 @@
 //! An insertion by the arm: approach, zeroing of the virtual sensor, recording.
 
 use crate::arm_simulation::{ArmError, ArmSimulation};
-use crate::slide_insertion::{InsertionSample, InstantVelocity, SampleRates};
+use crate::slide_insertion::{InsertionSample, SampleRates, VelocityAtStepEnd};
 use stylet_dynamics::{Error, JointVector};
 use stylet_scenario::{ArmConfig, ArmInsertionLine, MotionPlan, VirtualSensor};
 use stylet_tissue::{ForceLaw, ForceLawState, Rupture};
@@ -51,22 +51,22 @@ pub fn simulate_on_arm(
     let before = (line.approach.duration_s * physics_hz).ceil() as i64;
     let start_m = plan.at(0.0).position_m;
     let first = line.commanded_at(plan, -(before as f64) / physics_hz);
-    let mut rig: ArmSimulation =
+    let mut simulation: ArmSimulation =
         ArmSimulation::new(config, sensor, line, &first, start_m, 1.0 / physics_hz, seed)?;
 
     let mut zero = Zeroing::new(line.zero_window_s, physics_hz);
     let mut record = ArmRecording { zeroed_s: zero.until_s(physics_hz), ..ArmRecording::default() };
     let mut state = ForceLawState::default();
-    let mut motion = InstantVelocity::new(first, 1.0 / physics_hz);
+    let mut motion = VelocityAtStepEnd::new(first, 1.0 / physics_hz);
     for k in -before..rates.samples as i64 * steps {
         let time_s = k as f64 / physics_hz;
         let during_motion = |reason: Error| ArmError::DuringMotion { time_s, reason };
         let sampled = k >= 0 && k % steps == 0;
         let mut force = None;
         let (mut velocity_mps, mut acceleration_mps2) = (0.0, 0.0);
-        let arm_step = rig
+        let arm_step = simulation
             .step(&line.commanded_at(plan, time_s), sampled, |position_m, body_mps| {
-                (velocity_mps, acceleration_mps2) = motion.at_instant(body_mps);
+                (velocity_mps, acceleration_mps2) = motion.at_step_end(body_mps);
                 if k < 0 {
                     return 0.0;
                 }
@@ -89,7 +89,7 @@ pub fn simulate_on_arm(
             });
         }
         motion.advance(line.commanded_at(plan, (k + 1) as f64 / physics_hz));
-        zero.step(k, &mut rig, &mut record.virtual_force_n).map_err(during_motion)?;
+        zero.step(k, &mut simulation, &mut record.virtual_force_n).map_err(during_motion)?;
     }
     Ok(record)
 }
@@ -120,18 +120,18 @@ impl Zeroing {
     }
 
     /// Updates the window after step `k`.
-    fn step(&mut self, k: i64, rig: &mut ArmSimulation, recorded_n: &mut [f64]) -> Result<(), Error> {
+    fn step(&mut self, k: i64, simulation: &mut ArmSimulation, recorded_n: &mut [f64]) -> Result<(), Error> {
         let Some((from, until)) = self.window else { return Ok(()) };
         if k == from
-            && let Some(observer) = rig.observer_mut()
+            && let Some(observer) = simulation.observer_mut()
         {
             observer.begin_zeroing();
         }
         if k == until {
             self.window = None;
-            let zero = rig.observer_mut().map(|observer| observer.finish_zeroing()).transpose()?;
+            let zero = simulation.observer_mut().map(|observer| observer.finish_zeroing()).transpose()?;
             for (value, q) in recorded_n.iter_mut().zip(self.pending.drain(..)) {
-                *value -= zero.map_or(0.0, |zero| rig.axial_force_n(&q, &zero));
+                *value -= zero.map_or(0.0, |zero| simulation.axial_force_n(&q, &zero));
             }
         }
         Ok(())

@@ -52,7 +52,7 @@ pub fn simulate_replay(
 /// rapier integrates by semi-implicit Euler: the velocity of a body is the mean over the step that ended, half a step earlier than its position. The
 /// drive's deviation from the commanded mean of that step is added to the commanded velocity at that time.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct InstantVelocity {
+pub(crate) struct VelocityAtStepEnd {
     commanded: MotionPoint,
     /// Mean commanded velocity of the step that ended, m/s.
     mean_mps: f64,
@@ -60,7 +60,7 @@ pub(crate) struct InstantVelocity {
     dt_s: f64,
 }
 
-impl InstantVelocity {
+impl VelocityAtStepEnd {
     /// State at the first sample, where the body moves as commanded.
     pub(crate) fn new(start: MotionPoint, dt_s: f64) -> Self {
         let mean_mps = start.velocity_mps;
@@ -75,7 +75,7 @@ impl InstantVelocity {
     }
 
     /// Velocity (m/s) and acceleration (m/s²) at the end of the step, from the body's mean velocity over it.
-    pub(crate) fn at_instant(&mut self, body_mps: f64) -> (f64, f64) {
+    pub(crate) fn at_step_end(&mut self, body_mps: f64) -> (f64, f64) {
         let deviation_mps = body_mps - self.mean_mps;
         let deviation_mps2 = (deviation_mps - self.deviation_mps) / self.dt_s;
         self.deviation_mps = deviation_mps;
@@ -98,11 +98,11 @@ pub fn simulate_on_slide(
     let start = plan.at(0.0);
     let mut slide = Slide::new(start.position_m, start.velocity_mps, 1.0 / physics_hz);
     let mut state = ForceLawState::default();
-    let mut motion = InstantVelocity::new(start, 1.0 / physics_hz);
+    let mut motion = VelocityAtStepEnd::new(start, 1.0 / physics_hz);
     for k in 0..rates.samples * steps {
         let time_s = k as f64 / physics_hz;
         let (position_m, body_mps) = slide.tip();
-        let (velocity_mps, acceleration_mps2) = motion.at_instant(body_mps);
+        let (velocity_mps, acceleration_mps2) = motion.at_step_end(body_mps);
         let force = law.step(&mut state, time_s, position_m, velocity_mps, &mut on_rupture);
         if k % steps == 0 {
             let time_s = (k / steps) as f64 / rates.sample_hz;

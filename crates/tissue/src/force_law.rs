@@ -24,12 +24,16 @@ use alloc::vec::Vec;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TooManyEffects {
     /// Number of active tissue effects.
-    pub asked: usize,
+    pub effect_count: usize,
 }
 
 impl core::fmt::Display for TooManyEffects {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        write!(f, "{} effects act on the tissue at once; at most {MAX_EFFECTS} are possible", self.asked)
+        write!(
+            f,
+            "{} effects act on the tissue at once; at most {MAX_EFFECTS} are possible",
+            self.effect_count
+        )
     }
 }
 
@@ -77,7 +81,7 @@ impl ForceLaw {
         law.needle_n_per_m = 1.0 / springs.fold(0.0, |sum, spring| sum + spring);
         active.retain(|e| e.stage() > ChainStage::Geometry && !matches!(e, AnyEffect::NeedleCompliance(_)));
         if active.len() > MAX_EFFECTS {
-            return Err(TooManyEffects { asked: active.len() });
+            return Err(TooManyEffects { effect_count: active.len() });
         }
         for (stage, first) in law.first.iter_mut().enumerate() {
             *first = active.partition_point(|e| (e.stage() as usize) < stage) as u8;
@@ -267,7 +271,7 @@ impl ForceLaw {
         }
         let time_s = if time_s > state.time_s { time_s } else { state.time_s };
         let mut elastic_n = 0.0;
-        let mut done = 0.0;
+        let mut completed_share = 0.0;
         while let Some(slab) = self.slabs.get(state.ruptured) {
             let x = z - slab.front_m;
             elastic_n = slab.stiffness_n_per_m * if x > 0.0 { x } else { 0.0 };
@@ -282,8 +286,9 @@ impl ForceLaw {
                 break;
             }
             let dt = time_s - state.time_s;
-            let rupture = Self::locate_rupture(state, slab, dt, z, elastic_n, slab.puncture_n, done);
-            done = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
+            let rupture =
+                Self::locate_rupture(state, slab, dt, z, elastic_n, slab.puncture_n, completed_share);
+            completed_share = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
             state.ruptured += 1;
             state.elastic_n = 0.0;
             elastic_n = 0.0;
@@ -325,17 +330,17 @@ impl ForceLaw {
         v: f64,
         policy: &mut impl RupturePolicy,
     ) -> f64 {
-        let mut done = 0.0; // fraction of the step before the latest rupture
+        let mut completed_share = 0.0; // fraction of the step before the latest rupture
         while let Some(slab) = self.slabs.get(state.ruptured) {
             let tip = state.tip_state(state.time_s + dt, z, v);
             // After a rupture only the rest of the step is left.
-            let travel = if done > 0.0 { 0.0 } else { 1.0 };
-            let tip = TipState { dt_s: (1.0 - done) * dt, dz_m: travel * tip.dz_m, ..tip };
+            let travel = if completed_share > 0.0 { 0.0 } else { 1.0 };
+            let tip = TipState { dt_s: (1.0 - completed_share) * dt, dz_m: travel * tip.dz_m, ..tip };
             let elastic = self.layer_elastic_force(slab, &tip, &mut state.effects);
-            match self.try_rupture(state, slab, dt, (z, v), elastic, done, policy) {
+            match self.try_rupture(state, slab, dt, (z, v), elastic, completed_share, policy) {
                 None => return elastic,
                 Some(rupture) => {
-                    done = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
+                    completed_share = if dt > 0.0 { (rupture.time_s - state.time_s) / dt } else { 1.0 };
                 }
             }
         }
@@ -363,7 +368,7 @@ impl ForceLaw {
         elastic
     }
 
-    /// The rupture of the active layer, if the policy decides so. `done` is the fraction of the step that is over.
+    /// The rupture of the active layer, if the policy decides so. `completed_share` is the fraction of the step that is over.
     #[inline]
     #[allow(clippy::too_many_arguments, reason = "the inputs of one step")]
     pub(crate) fn try_rupture(
@@ -373,15 +378,20 @@ impl ForceLaw {
         dt: f64,
         (z, v): (f64, f64),
         elastic: f64,
-        done: f64,
+        completed_share: f64,
         policy: &mut impl RupturePolicy,
     ) -> Option<Rupture> {
         let mut threshold = slab.puncture_n;
         let layer = state.ruptured + 1;
         for (effect, memory) in self.effects_with_state(ChainStage::Puncture, &mut state.effects) {
             threshold = effect.puncture_force(threshold, v);
-            threshold =
-                effect.puncture_force_after_load(layer, (1.0 - done) * dt, elastic, threshold, memory);
+            threshold = effect.puncture_force_after_load(
+                layer,
+                (1.0 - completed_share) * dt,
+                elastic,
+                threshold,
+                memory,
+            );
         }
         let criterion = RuptureCriterion {
             layer: state.ruptured + 1,
@@ -393,7 +403,7 @@ impl ForceLaw {
         if !policy.ruptures(&criterion) {
             return None;
         }
-        let rupture = Self::locate_rupture(state, slab, dt, z, elastic, threshold, done);
+        let rupture = Self::locate_rupture(state, slab, dt, z, elastic, threshold, completed_share);
         for (effect, memory) in self.effects_with_state(ChainStage::Relaxation, &mut state.effects) {
             effect.on_rupture(rupture.released_n, rupture.position_m, memory);
         }
@@ -420,16 +430,16 @@ impl ForceLaw {
         z: f64,
         elastic: f64,
         threshold: f64,
-        done: f64,
+        completed_share: f64,
     ) -> Rupture {
         let share = |from: f64, to: f64, at: f64| {
             if to > from { ((at - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 }
         };
         // A layer that is entered within this step is loaded from its front face on, not from the last sample.
         let entry = share(state.z_m, z, slab.front_m);
-        let start = if state.z_m < slab.front_m { entry } else { 0.0 }.max(done);
+        let start = if state.z_m < slab.front_m { entry } else { 0.0 }.max(completed_share);
         let far = slab.rupture_position_m();
-        let at_face = if z >= far { share(state.z_m, z, far).max(done) } else { 2.0 };
+        let at_face = if z >= far { share(state.z_m, z, far).max(completed_share) } else { 2.0 };
         let at_force = if elastic >= threshold {
             start + (1.0 - start) * share(state.elastic_n, elastic, threshold)
         } else {

@@ -318,7 +318,7 @@ fn at_most_sixteen_effects_act_at_once() {
         16.0 * 0.01 + 9000.0 * 0.01 * 1e-4,
         1e-12,
     );
-    assert_eq!(many(MAX_EFFECTS + 1).err(), Some(TooManyEffects { asked: 17 }));
+    assert_eq!(many(MAX_EFFECTS + 1).err(), Some(TooManyEffects { effect_count: 17 }));
     // Sensor effects and a compliant needle do not count.
     let mut more = vec![one.clone(); MAX_EFFECTS];
     more.extend([ForceBias { force_n: 1.0 }.into(), NeedleCompliance { stiffness_n_per_m: 500.0 }.into()]);

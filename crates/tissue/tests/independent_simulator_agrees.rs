@@ -1,4 +1,4 @@
-//! Promise: the independent simulator (`stylet_examine::reality`) and the force law give the same force for every effect.
+//! Promise: the independent simulator (`stylet_examine::simulator`) and the force law give the same force for every effect.
 //! Neither uses code of the other; where they differ, one of them does not follow docs/reference/model.md.
 
 use stylet_examine::simulator::effect::{Effect, IDS};

@@ -5,7 +5,7 @@ use crate::cli::exit_codes::Failure;
 use crate::cli::progress_bar::Progress;
 use crate::cli::terminal_output::print;
 use std::path::PathBuf;
-use stylet_api::benchmark::{OnlineExport, Player, judge_online, online_files, replay_streams};
+use stylet_api::benchmark::{OnlineExport, TestedDetector, online_files, replay_streams, score_online};
 use stylet_examine::challenge_export::key_path;
 use stylet_examine::online::stream_folder::exported_streams;
 use stylet_examine::online::stream_scores::scores_text;
@@ -39,8 +39,8 @@ pub fn export(args: &BenchmarkExportArgs) -> Result<(), Failure> {
 /// [`Failure`] with the exit code that fits.
 pub fn replay(args: &BenchmarkReplayArgs) -> Result<(), Failure> {
     let player = match args.algorithm {
-        Some(algorithm) => Player::Core(algorithm.into()),
-        None => Player::Program(args.program.clone()),
+        Some(algorithm) => TestedDetector::Core(algorithm.into()),
+        None => TestedDetector::Program(args.program.clone()),
     };
     let name = args.name.clone().unwrap_or_else(|| {
         args.out.file_name().map_or_else(|| "detector".to_owned(), |n| n.to_string_lossy().into_owned())
@@ -60,7 +60,7 @@ pub fn replay(args: &BenchmarkReplayArgs) -> Result<(), Failure> {
 /// # Errors
 /// [`Failure`] with the exit code that fits.
 pub fn judge(args: &BenchmarkJudgeOnlineArgs) -> Result<(), Failure> {
-    let scores = judge_online(&args.folder, &args.answers)?;
+    let scores = score_online(&args.folder, &args.answers)?;
     if let Some(path) = &args.json {
         let json = stylet_api::output_files::to_json_bytes(&scores)?;
         std::fs::write(path, json)

@@ -31,12 +31,12 @@ const WAITING_PIECES: usize = 16;
 const INTERRUPTED_AGAIN: i32 = 130;
 
 /// Stop conditions: a signal, a failed output, or the duration.
-struct End {
+struct StopConditions {
     requested: Arc<AtomicBool>,
     at: Option<Instant>,
 }
 
-impl End {
+impl StopConditions {
     fn new(duration_s: Option<f64>) -> Result<Self, Failure> {
         let requested = Arc::new(AtomicBool::new(false));
         let flag = requested.clone();
@@ -74,7 +74,7 @@ pub fn listen(args: &ListenArgs) -> Result<(), Failure> {
         None => None,
     };
     let page = args.page.map(|port| serve_page(&args.host, port, &broadcast)).transpose()?;
-    let end = End::new(args.duration_s)?;
+    let end = StopConditions::new(args.duration_s)?;
     let only_printed = args.page.is_none() && args.forward.is_none();
     let printer = match args.quiet {
         true => None,
@@ -129,7 +129,7 @@ fn read_udp(
     session: &mut Session,
     broadcast: &Broadcast,
     reporter: &mut Reporter,
-    end: &End,
+    end: &StopConditions,
 ) -> Result<(), Failure> {
     while !end.is_reached() {
         match receiver.receive()? {
@@ -150,7 +150,7 @@ fn read_stdin(
     session: &mut Session,
     broadcast: &Broadcast,
     reporter: &mut Reporter,
-    end: &End,
+    end: &StopConditions,
 ) -> Result<(), Failure> {
     let failed = |why: std::io::Error| Failure::Check(format!("standard input: {why}"));
     // A read of standard input cannot be interrupted; the thread ends with the program.

@@ -1,7 +1,7 @@
 //! Messages of a stream on the terminal: the first ones of each kind; all are counted in the summary.
 
 use crate::cli::terminal_output::print_error;
-use stylet_api::live_stream::Report;
+use stylet_api::live_stream::StreamMessage;
 
 /// Messages of a kind that are printed.
 const PRINTED: u32 = 5;
@@ -16,11 +16,11 @@ pub struct Reporter {
 
 impl Reporter {
     /// Prints a report, unless there were many of its kind.
-    pub fn print(&mut self, report: &Report) {
+    pub fn print(&mut self, report: &StreamMessage) {
         let count = match report {
-            Report::Invalid(_) => &mut self.invalid,
-            Report::Unused { .. } => &mut self.unused,
-            Report::Restarted { .. } => &mut self.restarted,
+            StreamMessage::Invalid(_) => &mut self.invalid,
+            StreamMessage::Unused { .. } => &mut self.unused,
+            StreamMessage::Restarted { .. } => &mut self.restarted,
         };
         *count = count.saturating_add(1);
         if *count <= PRINTED {

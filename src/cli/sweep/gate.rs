@@ -42,7 +42,7 @@ pub fn gate(args: &GateArgs) -> Result<(), Failure> {
         write_file_atomically(&at, &to_json_bytes(&new)?)?;
     }
     if !args.quiet {
-        text.push_str(&against(old.as_ref(), &new, &at, args.update));
+        text.push_str(&baseline_comparison(old.as_ref(), &new, &at, args.update));
     }
     if let Some(path) = &args.junit {
         write_file_atomically(path, junit_xml(&judged).as_bytes())?;
@@ -81,7 +81,7 @@ fn is_gate_results(bytes: &[u8]) -> bool {
 }
 
 /// The differences from the baseline, and whether it was replaced.
-fn against(old: Option<&Baseline>, new: &Baseline, at: &Path, updated: bool) -> String {
+fn baseline_comparison(old: Option<&Baseline>, new: &Baseline, at: &Path, updated: bool) -> String {
     let at = at.display();
     let mut text = String::new();
     if let Some(old) = old {

@@ -23,6 +23,6 @@ pub fn sweep(args: &SweepArgs) -> Result<(), Failure> {
         Some(SweepCommand::RunShard(run)) => shards::run_shard(run),
         Some(SweepCommand::Merge(merge)) => shards::merge(merge),
         Some(SweepCommand::Map(map)) => robustness_map::map(map),
-        None => whole_sweep::run_whole(args),
+        None => whole_sweep::run_all_trials(args),
     }
 }

@@ -18,7 +18,7 @@ use stylet_sweep::{Columns, DiskTrialTable, Summary, Sweep};
 ///
 /// # Errors
 /// [`Failure`] with the exit code that fits.
-pub fn run_whole(args: &SweepArgs) -> Result<(), Failure> {
+pub fn run_all_trials(args: &SweepArgs) -> Result<(), Failure> {
     let Some(file) = &args.sweep else {
         return Err(Failure::Check(
             "no sweep file is given; try stylet sweep scenarios/sweeps/noise.ron".into(),

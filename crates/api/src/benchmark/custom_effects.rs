@@ -46,7 +46,7 @@ impl CustomEffect for HiddenEffect {
         paths.zip(self.0.parameters()).collect()
     }
 
-    fn drawn(&self, uniform: &mut dyn FnMut() -> f64) -> Arc<dyn CustomEffect> {
+    fn with_random_parameters(&self, uniform: &mut dyn FnMut() -> f64) -> Arc<dyn CustomEffect> {
         Arc::new(self.changed(|is_strength, value| {
             value * if is_strength { 1.0 } else { SHAPE_FACTOR.powf(2.0 * uniform() - 1.0) }
         }))

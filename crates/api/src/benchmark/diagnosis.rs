@@ -124,7 +124,7 @@ impl DiagnosisBenchmark {
         let lock = OutputLock::new(folder)?;
         let journal = folder.join("cases.jsonl");
         if !from_journal {
-            keep_effects(&custom, folder, journal.exists())?;
+            store_custom_effects(&custom, folder, journal.exists())?;
         }
         let mut cases = plan.cases();
         if from_journal {
@@ -163,7 +163,7 @@ impl DiagnosisBenchmark {
 }
 
 /// Keeps the custom effects beside the journal, whose answers depend on them. A file that is there is never replaced.
-fn keep_effects(custom: &[AnyEffect], folder: &Path, has_journal: bool) -> Result<(), Error> {
+fn store_custom_effects(custom: &[AnyEffect], folder: &Path, has_journal: bool) -> Result<(), Error> {
     let path = folder.join("effects.ron");
     let text = effects_to_ron(custom).map_err(Error::internal)?;
     let kept = std::fs::read_to_string(&path).ok();

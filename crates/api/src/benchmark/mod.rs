@@ -9,7 +9,7 @@ mod online_export;
 mod planning;
 
 pub use diagnosis::{CaseSelection, DiagnosisBenchmark};
-pub use online::{Player, judge_online, online_files, replay_streams};
+pub use online::{TestedDetector, online_files, replay_streams, score_online};
 pub use online_export::OnlineExport;
 pub use planning::PlanningBenchmark;
 

@@ -24,7 +24,7 @@ fn request(error: ChallengeError) -> Error {
 
 /// Detector under test.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Player {
+pub enum TestedDetector {
     /// A program with its arguments, started once per thread; samples and replies go through a pipe.
     Program(Vec<String>),
     /// An algorithm of this project.
@@ -47,14 +47,14 @@ struct Reply {
 /// removed.
 pub fn replay_streams(
     folder: &Path,
-    player: &Player,
+    player: &TestedDetector,
     name: &str,
     out: &Path,
     threads: usize,
     done: &(dyn Fn() + Sync),
 ) -> Result<u64, Error> {
     if out.exists() {
-        return Err(request(ChallengeError::There(out.display().to_string())));
+        return Err(request(ChallengeError::FolderExists(out.display().to_string())));
     }
     let streams = exported_streams(folder).map_err(request)?;
     let mut part = out.as_os_str().to_owned();
@@ -89,7 +89,7 @@ impl Answers<'_> {
         &self,
         folder: &Path,
         streams: &[ExportedStream],
-        player: &Player,
+        player: &TestedDetector,
         name: &str,
         threads: usize,
     ) -> Result<u64, Error> {
@@ -105,7 +105,7 @@ impl Answers<'_> {
                         Some(detector) => detector,
                         None => Detector::start(player)?,
                     };
-                    let answer = self.one(folder, stream, &mut detector)?;
+                    let answer = self.replay_stream(folder, stream, &mut detector)?;
                     idle.lock().map_err(Error::internal)?.push(detector);
                     (self.done)();
                     Ok(answer)
@@ -122,7 +122,7 @@ impl Answers<'_> {
         Ok(samples)
     }
 
-    fn one(
+    fn replay_stream(
         &self,
         folder: &Path,
         stream: &ExportedStream,
@@ -168,26 +168,30 @@ impl Answers<'_> {
 
 /// A running detector.
 enum Detector {
-    Program(Pipe),
-    Core(Box<OwnCore>),
+    Program(ProgramPipe),
+    Core(Box<BuiltInDetector>),
 }
 
 /// An algorithm of this project, with velocities estimated from the positions.
-struct OwnCore {
+struct BuiltInDetector {
     config: EnhanceConfig,
     core: Enhancer<Vec<Sample>>,
     velocity: VelocityEstimator,
 }
 
 impl Detector {
-    fn start(player: &Player) -> Result<Self, Error> {
+    fn start(player: &TestedDetector) -> Result<Self, Error> {
         match player {
-            Player::Program(command) => Ok(Self::Program(Pipe::start(command)?)),
-            Player::Core(algorithm) => {
+            TestedDetector::Program(command) => Ok(Self::Program(ProgramPipe::start(command)?)),
+            TestedDetector::Core(algorithm) => {
                 let mut config = EnhanceConfig { algorithm: *algorithm, ..EnhanceConfig::default() };
                 config.stylet.derived_velocity = true;
                 let core = Enhancer::new(config.clone(), 0.0, vec![Sample::default(); STORED_SAMPLES]);
-                Ok(Self::Core(Box::new(OwnCore { config, core, velocity: VelocityEstimator::default() })))
+                Ok(Self::Core(Box::new(BuiltInDetector {
+                    config,
+                    core,
+                    velocity: VelocityEstimator::default(),
+                })))
             }
         }
     }
@@ -213,7 +217,7 @@ impl Detector {
                 pipe.reply()
             }
             Self::Core(own) => {
-                let OwnCore { core, velocity, .. } = own.as_mut();
+                let BuiltInDetector { core, velocity, .. } = own.as_mut();
                 let velocity_mps = velocity.at(time_s, position_m);
                 let out = core.step(Sample { time_s, position_m, velocity_mps, force_n });
                 if out.used {
@@ -233,14 +237,14 @@ impl Detector {
 }
 
 /// A program and the two ends of its pipe.
-struct Pipe {
+struct ProgramPipe {
     child: Child,
     to: Option<BufWriter<ChildStdin>>,
     from: BufReader<ChildStdout>,
     line: String,
 }
 
-impl Pipe {
+impl ProgramPipe {
     fn start(command: &[String]) -> Result<Self, Error> {
         let (program, arguments) = command
             .split_first()
@@ -275,7 +279,7 @@ impl Pipe {
     }
 }
 
-impl Drop for Pipe {
+impl Drop for ProgramPipe {
     fn drop(&mut self) {
         // Closing its input ends the program.
         self.to = None;
@@ -304,7 +308,7 @@ fn parse_reply(line: &str) -> Result<Reply, String> {
 /// Scores of the answers in these folders to the streams of `folder`, best F1 within 0.5 mm first.
 ///
 /// # Errors [`Error::Request`] with file and line.
-pub fn judge_online(folder: &Path, answers: &[PathBuf]) -> Result<Vec<EntrantScore>, Error> {
+pub fn score_online(folder: &Path, answers: &[PathBuf]) -> Result<Vec<EntrantScore>, Error> {
     let streams = streams_with_truth(folder).map_err(request)?;
     let mut scores = answers
         .iter()
@@ -370,12 +374,13 @@ mod tests {
         let folder = scratch("silent");
         let streams = exported(&folder);
         let (core, silent) = (folder.join("core"), folder.join("silent"));
-        replay_streams(&streams, &Player::Core(Algorithm::Stylet), "Stylet", &core, 2, &|| {}).unwrap();
+        replay_streams(&streams, &TestedDetector::Core(Algorithm::Stylet), "Stylet", &core, 2, &|| {})
+            .unwrap();
         // One empty line per sample.
         let program = ["sh", "-c", "while read -r line; do case $line in start*) ;; *) echo;; esac; done"];
-        let program = Player::Program(program.map(str::to_owned).to_vec());
+        let program = TestedDetector::Program(program.map(str::to_owned).to_vec());
         replay_streams(&streams, &program, "silent", &silent, 1, &|| {}).unwrap();
-        let scores = judge_online(&streams, &[silent, core]).unwrap();
+        let scores = score_online(&streams, &[silent, core]).unwrap();
         assert_eq!(scores.iter().map(|s| s.entrant.as_str()).collect::<Vec<_>>(), ["Stylet", "silent"]);
         assert!(scores[0].all.missed <= 1 && scores[0].all.false_alarms <= 1, "{:?}", scores[0].all);
         assert!(scores[0].all.enhancement_error.is_some_and(|e| e < 0.5), "{:?}", scores[0].all);
@@ -384,7 +389,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_that_ends_or_says_something_else_is_named_with_the_sample_and_leaves_no_answers() {
+    fn a_program_that_ends_or_replies_invalidly_is_reported_with_the_sample_and_leaves_no_answers() {
         let folder = scratch("wrong");
         let streams = exported(&folder);
         for (script, expected) in [
@@ -394,7 +399,7 @@ mod tests {
             ),
             ("read -r a; exit 0", "sample 1"),
         ] {
-            let program = Player::Program(vec!["sh".to_owned(), "-c".to_owned(), script.to_owned()]);
+            let program = TestedDetector::Program(vec!["sh".to_owned(), "-c".to_owned(), script.to_owned()]);
             let out = folder.join("answers");
             let error = replay_streams(&streams, &program, "x", &out, 1, &|| {}).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");

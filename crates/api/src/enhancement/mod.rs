@@ -12,6 +12,6 @@ pub use identified_model::IdentifiedModel;
 pub use result::{
     AppliedModel, EnhancementResult, RecordingExtent, ResultSource, enhance_recording, unused_note,
 };
-pub use result_files::impossible;
+pub use result_files::impossible_estimates;
 pub use streaming::enhance_long_recording;
 pub use whole_recording::{enhance, enhance_as, enhance_with_model};

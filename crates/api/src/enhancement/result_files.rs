@@ -98,7 +98,7 @@ fn interval(value: f64, sd: f64) -> [f64; 2] {
 /// Physically impossible values of an estimate (negative stiffness or friction beyond the interval, layer thicker than 1 m),
 /// each with the reason.
 #[must_use]
-pub fn impossible(e: &LayerEstimate) -> Vec<String> {
+pub fn impossible_estimates(e: &LayerEstimate) -> Vec<String> {
     let mut out = Vec::new();
     for (name, value, sd) in
         [("stiffness", e.stiffness_n_per_m, e.stiffness_sd), ("friction", e.friction, e.friction_sd)]
@@ -133,7 +133,7 @@ pub(super) fn results_of_run(run: &AlgorithmRun) -> RunResult {
         friction_unit,
         drop_n: e.drop_n,
         cumulative_friction_added_ns_per_m: e.added_friction_ns_per_m,
-        impossible: impossible(e),
+        impossible: impossible_estimates(e),
         intervals: Intervals::new(e),
     };
     RunResult {

@@ -14,5 +14,5 @@ pub use broadcast::{Broadcast, Subscriber};
 pub use line_splitter::{LineSplitter, MAX_LINE_BYTES};
 pub use sample_parser::{InvalidLine, StreamSample, parse_bytes, parse_line};
 pub(crate) use stream_session::STORED_SAMPLES;
-pub use stream_session::{Report, Session, StreamCounts};
+pub use stream_session::{Session, StreamCounts, StreamMessage};
 pub(crate) use velocity_from_positions::VelocityEstimator;

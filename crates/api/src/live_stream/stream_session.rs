@@ -42,7 +42,7 @@ pub struct StreamCounts {
 
 /// Message that the operator should see at once.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum Report {
+pub enum StreamMessage {
     /// A line that is not a sample.
     #[error("{0}")]
     Invalid(InvalidLine),
@@ -162,7 +162,12 @@ impl Session {
     }
 
     /// Processes a datagram of one or more lines that arrived at `arrived`; calls `report` with messages for the operator.
-    pub fn process_datagram(&mut self, bytes: &[u8], arrived: Instant, report: &mut dyn FnMut(Report)) {
+    pub fn process_datagram(
+        &mut self,
+        bytes: &[u8],
+        arrived: Instant,
+        report: &mut dyn FnMut(StreamMessage),
+    ) {
         let bytes = bytes.strip_suffix(b"\n").unwrap_or(bytes);
         for line in bytes.split(|byte| *byte == b'\n') {
             self.process_line(line, arrived, report);
@@ -170,21 +175,21 @@ impl Session {
     }
 
     /// As [`Self::process_datagram`] for one line.
-    pub fn process_line(&mut self, line: &[u8], arrived: Instant, report: &mut dyn FnMut(Report)) {
+    pub fn process_line(&mut self, line: &[u8], arrived: Instant, report: &mut dyn FnMut(StreamMessage)) {
         self.lines += 1;
         match parse_bytes(self.lines, line) {
             Ok(Some(sample)) => {
                 let out = self.step(sample, arrived);
                 match out.unused_reason {
-                    Some(reason) => report(Report::Unused { line: self.lines, reason }),
-                    None if out.restarted => report(Report::Restarted { line: self.lines }),
+                    Some(reason) => report(StreamMessage::Unused { line: self.lines, reason }),
+                    None if out.restarted => report(StreamMessage::Restarted { line: self.lines }),
                     None => {}
                 }
             }
             Ok(None) => {}
             Err(invalid) => {
                 self.counts.bad_lines += 1;
-                report(Report::Invalid(invalid));
+                report(StreamMessage::Invalid(invalid));
             }
         }
     }

@@ -19,11 +19,11 @@ pub(super) struct Manifest {
     pub(super) input: Option<String>,
 }
 
-pub(super) fn sum(content: &[u8]) -> String {
+pub(super) fn sha256(content: &[u8]) -> String {
     hex(&Sha256::digest(content))
 }
 
-pub(super) fn sum_of_file(path: &Path) -> io::Result<String> {
+pub(super) fn sha256_of_file(path: &Path) -> io::Result<String> {
     let mut hash = Sha256::new();
     io::copy(&mut File::open(path)?, &mut hash)?;
     Ok(hex(&hash.finalize()))

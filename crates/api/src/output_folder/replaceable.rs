@@ -1,6 +1,6 @@
 //! Checks which existing files an output may replace: only files that Stylet wrote, and never an input.
 
-use super::manifest::{MANIFEST, Manifest, sum, sum_of_file};
+use super::manifest::{MANIFEST, Manifest, sha256, sha256_of_file};
 use crate::error::Error;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -51,8 +51,8 @@ pub(super) enum Content<'a> {
 impl Content<'_> {
     fn is_that_of(&self, path: &Path) -> bool {
         match self {
-            Self::Bytes(bytes) => sum_of_file(path).is_ok_and(|found| found == sum(bytes)),
-            Self::Sha256(expected) => sum_of_file(path).is_ok_and(|found| found == *expected),
+            Self::Bytes(bytes) => sha256_of_file(path).is_ok_and(|found| found == sha256(bytes)),
+            Self::Sha256(expected) => sha256_of_file(path).is_ok_and(|found| found == *expected),
             Self::Unknown => false,
         }
     }

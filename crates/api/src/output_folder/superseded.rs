@@ -1,6 +1,6 @@
 //! Files of an old set that the new set does not have.
 
-use super::manifest::{MANIFEST, Manifest, sum_of_file};
+use super::manifest::{MANIFEST, Manifest, sha256_of_file};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -27,7 +27,8 @@ pub(super) fn superseded_files(folder: &Path, whole: &Path, old: &Path) -> Vec<S
     let is_superseded = |(name, sum): &(String, String)| {
         is_here(name)
             && !new.sha256.contains_key(name)
-            && (old.join(name).exists() || sum_of_file(&folder.join(name)).is_ok_and(|found| found == *sum))
+            && (old.join(name).exists()
+                || sha256_of_file(&folder.join(name)).is_ok_and(|found| found == *sum))
     };
     present.sha256.into_iter().filter(is_superseded).map(|(name, _)| name).collect()
 }

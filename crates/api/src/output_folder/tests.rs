@@ -107,7 +107,7 @@ fn a_move_that_fails_anywhere_is_undone() -> Result<(), Error> {
             left < 0
         });
         // Committed.
-        if !folder.join(COMPLETE).exists() {
+        if !folder.join(COMPLETE_FOLDER).exists() {
             continue;
         }
         taken_back += 1;
@@ -152,7 +152,7 @@ fn a_file_that_the_new_set_lacks_is_removed() -> Result<(), Error> {
     fs::write(&elsewhere.0, "other").map_err(|e| failed(&elsewhere.0, e))?;
     let name = format!("../{}", elsewhere.0.file_name().unwrap_or_default().to_string_lossy());
     let mut manifest = superseded::manifest_in(&scratch.0);
-    manifest.sha256.insert(name, sum(b"other"));
+    manifest.sha256.insert(name, sha256(b"other"));
     let text = serde_json::to_vec(&manifest).unwrap_or_default();
     fs::write(scratch.0.join(MANIFEST), text).map_err(|e| failed(&scratch.0, e))?;
     write(&set("newer"), &[])?;
@@ -183,7 +183,7 @@ fn a_staged_file_is_removed_with_the_lock() -> Result<(), Error> {
     OutputLock::new(&scratch.0)?.write_set(&[], &set("old"), &Inputs::default())?;
     let lock = OutputLock::new(&scratch.0)?;
     lock.stage_file(NAMES[0])?.write_all(b"half").map_err(|e| failed(&scratch.0, e))?;
-    assert_eq!(leftovers(&scratch.0), [NEW]);
+    assert_eq!(leftovers(&scratch.0), [STAGING_FOLDER]);
     drop(lock);
     assert_eq!((set_in(&scratch.0).as_deref(), leftovers(&scratch.0)), (Some("old"), vec![]));
     Ok(())

@@ -14,10 +14,10 @@ const SETTLED_NATS: f64 = 10.0;
 
 impl KalmanEnhancer {
     /// Evaluates the hypotheses in air whenever the number of samples has grown by a quarter or the force leaves the baseline
-    /// (`away`: 1 above it, -1 below). Returns the evidence when a contact has begun.
-    pub(super) fn look_at_air(&mut self, sample: &Sample, away: i8) -> Option<AirEvidence> {
+    /// (`side`: 1 above it, -1 below). Returns the evidence when a contact has begun.
+    pub(super) fn evaluate_air_evidence(&mut self, sample: &Sample, side: i8) -> Option<AirEvidence> {
         let due = self.baseline.history.samples >= self.baseline.next_evaluation;
-        if !due && away == 0 || self.baseline.history.samples < MIN_SAMPLES {
+        if !due && side == 0 || self.baseline.history.samples < MIN_SAMPLES {
             return None;
         }
         if due {
@@ -29,11 +29,11 @@ impl KalmanEnhancer {
             self.absorb_step_in_air(sample, &evidence);
         } else if evidence.contact_nats() > DECISION_NATS {
             // A moving baseline may already follow the load, so that the force does not leave it.
-            let seen = away > 0 || self.baseline.moving || evidence.contact_nats() > SETTLED_NATS;
+            let seen = side > 0 || self.baseline.moving || evidence.contact_nats() > SETTLED_NATS;
             return seen.then_some(evidence);
-        } else if evidence.quiet.nats > evidence.bend.nats.max(evidence.step.nats) {
-            let moves = evidence.quiet.form != Form::Constant
-                && evidence.quiet.nats - evidence.constant_nats > DECISION_NATS;
+        } else if evidence.no_event.nats > evidence.bend.nats.max(evidence.step.nats) {
+            let moves = evidence.no_event.form != Form::Constant
+                && evidence.no_event.nats - evidence.constant_nats > DECISION_NATS;
             if moves || self.baseline.moving {
                 self.follow_baseline(sample, &evidence);
             }
@@ -44,8 +44,8 @@ impl KalmanEnhancer {
     /// Fits the baseline to all samples in air.
     #[cold]
     fn follow_baseline(&mut self, sample: &Sample, evidence: &AirEvidence) {
-        let fit = self.baseline.history.quiet_fit(evidence, sample);
-        self.baseline.follow(&fit, evidence.quiet.form != Form::Constant, sample);
+        let fit = self.baseline.history.fit_all_blocks(evidence, sample);
+        self.baseline.follow(&fit, evidence.no_event.form != Form::Constant, sample);
         self.restart_noise(sample, &fit, evidence.excess);
         (self.samples_above_threshold, self.samples_below_threshold) = (0, 0);
     }
@@ -102,8 +102,11 @@ impl KalmanEnhancer {
             sd = libm::sqrt(sd * sd + fit.p[0][0]);
         }
         self.start_contact(config, step, sample, sample.position_m, rise, rise + 3.0 * sd);
-        let unknown =
-            if moving { Some(fit) } else { self.baseline.history.doubtful_constant(fit, evidence, sample) };
+        let unknown = if moving {
+            Some(fit)
+        } else {
+            self.baseline.history.constant_mixture_fit(fit, evidence, sample)
+        };
         if let Some(fit) = unknown {
             self.set_estimator_baseline(&fit);
         }
@@ -135,7 +138,7 @@ impl KalmanEnhancer {
             self.baseline.settled = true;
             return;
         }
-        self.baseline.history.push_doubtful(&Sample { force_n: self.baseline.measured_n, ..*sample });
+        self.baseline.history.push_uncertain(&Sample { force_n: self.baseline.measured_n, ..*sample });
         if self.baseline.history.samples < self.baseline.next_evaluation {
             return;
         }
@@ -166,7 +169,7 @@ impl KalmanEnhancer {
 
     /// True if the contact is final, or would be if it were evaluated now.
     #[cold]
-    pub(super) fn contact_is_sure(&mut self) -> bool {
+    pub(super) fn is_contact_final(&mut self) -> bool {
         if !self.baseline.settled {
             self.operations += self.baseline.history.evaluation_operations();
             self.baseline.settled = self.baseline.history.evaluate().contact_nats() > SETTLED_NATS;

@@ -76,7 +76,7 @@ impl Hypothesis {
         Self { form: Form::Constant, nats: f64::NEG_INFINITY, from: 0, size: 0.0, sums: Suffix::default() }
     }
 
-    fn improve(&mut self, other: Hypothesis) {
+    fn keep_more_probable(&mut self, other: Hypothesis) {
         if other.nats > self.nats {
             *self = other;
         }
@@ -87,7 +87,7 @@ impl Hypothesis {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AirEvidence {
     /// No event.
-    pub(super) quiet: Hypothesis,
+    pub(super) no_event: Hypothesis,
     /// A step of the zero.
     pub(super) step: Hypothesis,
     /// A bend: contact.
@@ -114,7 +114,7 @@ impl AirEvidence {
 
     /// Log odds of a contact against everything else.
     pub(super) fn contact_nats(&self) -> f64 {
-        self.bend.nats - self.quiet.nats.max(self.step.nats)
+        self.bend.nats - self.no_event.nats.max(self.step.nats)
     }
 
     /// Probability of a contact.
@@ -129,7 +129,7 @@ impl AirEvidence {
 
     /// Log odds of a step of the zero against everything else.
     pub(super) fn step_nats(&self) -> f64 {
-        self.step.nats - self.quiet.nats.max(self.bend.nats)
+        self.step.nats - self.no_event.nats.max(self.bend.nats)
     }
 }
 
@@ -178,18 +178,18 @@ impl AirHistory {
 
     /// Adds a sample in air.
     pub(super) fn push(&mut self, sample: &Sample) {
-        self.take(sample, true);
+        self.add_sample(sample, true);
     }
 
     /// Adds a sample that may be in tissue, where the force changes by more than the noise; it does not update a noise level that is
     /// known.
-    pub(super) fn push_doubtful(&mut self, sample: &Sample) {
+    pub(super) fn push_uncertain(&mut self, sample: &Sample) {
         let rho = self.rho();
         let is_known = self.samples * (1.0 - rho) >= MIN_FOR_NOISE * (1.0 + rho);
-        self.take(sample, !is_known);
+        self.add_sample(sample, !is_known);
     }
 
-    fn take(&mut self, sample: &Sample, informs_noise: bool) {
+    fn add_sample(&mut self, sample: &Sample, informs_noise: bool) {
         if self.samples == 0.0 {
             self.origin = *sample;
         }
@@ -364,7 +364,13 @@ impl AirHistory {
                     && size * size > least_step_n2
                     && jump_n * size > MIN_JUMP_SHARE * size * size
                 {
-                    step[k].improve(Hypothesis { form: *form, nats: 0.5 * gain, from: j, size, sums });
+                    step[k].keep_more_probable(Hypothesis {
+                        form: *form,
+                        nats: 0.5 * gain,
+                        from: j,
+                        size,
+                        sums,
+                    });
                 }
                 let independent = (total.weight - sums.n) * variance;
                 if let Some((gain, size)) = sums.bend_gain(*form, &total, onset)
@@ -373,7 +379,13 @@ impl AirHistory {
                 {
                     // The slope is unknown: integrated over, the likelihood is proportional to its standard deviation.
                     onset_nats[k][j] = 0.5 * gain + libm::log(size) - 0.5 * libm::log(gain);
-                    bend[k].improve(Hypothesis { form: *form, nats: 0.5 * gain, from: j, size, sums });
+                    bend[k].keep_more_probable(Hypothesis {
+                        form: *form,
+                        nats: 0.5 * gain,
+                        from: j,
+                        size,
+                        sums,
+                    });
                 }
             }
         }
@@ -386,7 +398,7 @@ impl AirHistory {
         let excess = (least / (blocks.len() as f64 - 4.0).max(1.0)).max(1.0);
         let (mut out, event) = (
             AirEvidence {
-                quiet: Hypothesis::none(),
+                no_event: Hypothesis::none(),
                 step: Hypothesis::none(),
                 bend: Hypothesis::none(),
                 constant_nats: -0.5 * residual(Form::Constant) / excess,
@@ -404,17 +416,22 @@ impl AirHistory {
             if form != Form::Constant && total.weight * variance < MIN_INDEPENDENT {
                 continue;
             }
-            out.quiet.improve(Hypothesis { form, nats: base, from: blocks.len(), ..Hypothesis::none() });
-            out.step.improve(Hypothesis {
+            out.no_event.keep_more_probable(Hypothesis {
+                form,
+                nats: base,
+                from: blocks.len(),
+                ..Hypothesis::none()
+            });
+            out.step.keep_more_probable(Hypothesis {
                 nats: base + step[k].nats / excess - event - STEP_PRIOR_NATS,
                 ..step[k]
             });
             let bend = Hypothesis { nats: base + bend[k].nats / excess - event, ..bend[k] };
-            out.bend.improve(bend);
+            out.bend.keep_more_probable(bend);
             if form == Form::Constant {
                 out.constant_bend_nats = out.bend.nats;
             } else {
-                out.moving_bend.improve(bend);
+                out.moving_bend.keep_more_probable(bend);
             }
         }
         let form = usize::from(out.bend.form != Form::Constant);

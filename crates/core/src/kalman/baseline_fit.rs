@@ -56,8 +56,8 @@ impl BaselineFit {
 
 impl AirHistory {
     /// The baseline of all blocks, referred to a time and place.
-    pub(super) fn quiet_fit(&self, evidence: &AirEvidence, at: &Sample) -> BaselineFit {
-        self.fit(evidence, &evidence.total, evidence.quiet.form, at)
+    pub(super) fn fit_all_blocks(&self, evidence: &AirEvidence, at: &Sample) -> BaselineFit {
+        self.fit(evidence, &evidence.total, evidence.no_event.form, at)
     }
 
     /// The baseline of the blocks before a bend. A drift or line that is not sure is fitted, but not named.
@@ -68,7 +68,7 @@ impl AirHistory {
     }
 
     /// A constant baseline fitted before a bend, with the covariance of its mixture with a moving one; `None` if that is improbable.
-    pub(super) fn doubtful_constant(
+    pub(super) fn constant_mixture_fit(
         &self,
         mut constant: BaselineFit,
         evidence: &AirEvidence,

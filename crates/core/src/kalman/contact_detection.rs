@@ -65,15 +65,15 @@ impl KalmanEnhancer {
         self.samples_above_threshold = if above { self.samples_above_threshold + 1 } else { 0 };
         self.samples_below_threshold = if below { self.samples_below_threshold + 1 } else { 0 };
         let count = self.samples_above_threshold.max(self.samples_below_threshold);
-        let mut away = 0;
+        let mut side = 0;
         if count <= CONTACT_SAMPLES {
-            self.next_look_at = CONTACT_SAMPLES;
+            self.next_air_evaluation_at = CONTACT_SAMPLES;
         }
-        if count >= self.next_look_at {
-            self.next_look_at = count + 1 + count / 4;
-            away = if above { 1 } else { -1 };
+        if count >= self.next_air_evaluation_at {
+            self.next_air_evaluation_at = count + 1 + count / 4;
+            side = if above { 1 } else { -1 };
         }
-        if let Some(evidence) = self.look_at_air(sample, away)
+        if let Some(evidence) = self.evaluate_air_evidence(sample, side)
             && !known
         {
             self.start_contact_at_bend(config, step, sample, &evidence, (rise, sd));

@@ -29,7 +29,7 @@ impl ContinuedDrop {
         CompletedDrop { layer, drop_n: self.drop_n, drop_sd_n: libm::sqrt(self.variance_n2 + level_n2) }
     }
 
-    /// Takes a sample with noise of variance `noise_n2`, of which so many are averaged.
+    /// Adds a sample with noise of variance `noise_n2` in N², of which `averaged` are averaged.
     pub(super) fn push(&mut self, force_n: f64, noise_n2: f64, averaged: f64) {
         let further_n = self.level_n - force_n;
         let variance = noise_n2 * (1.0 + 1.0 / self.count);

@@ -30,7 +30,7 @@ const C: usize = 4;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ForcePredictor {
-    pub(crate) belief: Gaussian<5>,
+    pub(crate) state: Gaussian<5>,
     last_n: f64,
     /// There is no previous sample to whiten the next one with.
     unpaired: bool,
@@ -54,7 +54,7 @@ impl ForcePredictor {
     /// In air: constant level.
     pub(crate) fn new(level_n: f64) -> Self {
         Self {
-            belief: Gaussian::new([level_n, 0.0, 0.0, 0.0, 0.0], [1.0, 1e-12, 1e-12, 1e-12, 1e-12]),
+            state: Gaussian::new([level_n, 0.0, 0.0, 0.0, 0.0], [1.0, 1e-12, 1e-12, 1e-12, 1e-12]),
             last_n: level_n,
             unpaired: true,
         }
@@ -75,14 +75,14 @@ impl ForcePredictor {
         let v2 = speed_mps * speed_mps;
         let slope = scale / (MEMORY_M * MEMORY_M);
         self.reset_level(measured_n, noise);
-        self.belief.reset_component(R, 0.0, slope * v2);
-        self.belief.reset_component(S, 0.0, slope);
-        self.belief.reset_component(C, 0.0, slope / v2);
+        self.state.reset_component(R, 0.0, slope * v2);
+        self.state.reset_component(S, 0.0, slope);
+        self.state.reset_component(C, 0.0, slope / v2);
         if forget_friction {
-            self.belief.reset_component(B, 0.0, scale / v2);
+            self.state.reset_component(B, 0.0, scale / v2);
         } else {
-            let (mean, variance) = (self.belief.x[B], self.belief.p[B][B]);
-            self.belief.reset_component(B, mean, variance.min(scale / v2));
+            let (mean, variance) = (self.state.x[B], self.state.p[B][B]);
+            self.state.reset_component(B, mean, variance.min(scale / v2));
         }
     }
 
@@ -90,7 +90,7 @@ impl ForcePredictor {
     #[inline(always)]
     pub(crate) fn advance(&mut self, step: &MotionStep, noise: &NoiseEstimator) {
         let MotionStep { dt_s, dz_m, dv_mps, .. } = *step;
-        let g = &mut self.belief;
+        let g = &mut self.state;
         g.add_multiple(L, R, dt_s);
         if dz_m != 0.0 {
             g.add_multiple(L, S, dz_m);
@@ -119,26 +119,26 @@ impl ForcePredictor {
     ) -> Innovation<5> {
         if self.unpaired {
             let r = 1.0 / (1.0 - noise.rho * noise.rho);
-            return self.belief.innovation([L], [1.0], force_n, r);
+            return self.state.innovation([L], [1.0], force_n, r);
         }
         let rho = step.rho;
         if rho == 0.0 {
-            return self.belief.innovation([L], [1.0], force_n, 1.0);
+            return self.state.innovation([L], [1.0], force_n, 1.0);
         }
         let h = [1.0 - rho, rho * step.dt_s, rho * step.dz_m, rho * step.dv_mps];
-        self.belief.innovation([L, R, S, B], h, force_n - rho * self.last_n, 1.0)
+        self.state.innovation([L, R, S, B], h, force_n - rho * self.last_n, 1.0)
     }
 
     #[inline(always)]
     pub(crate) fn update(&mut self, innovation: &Innovation<5>, force_n: f64) {
-        self.belief.update(innovation);
+        self.state.update(innovation);
         self.last_n = force_n;
         self.unpaired = false;
     }
 
     /// Resets the level to a measured force and keeps the slopes.
     pub(crate) fn reset_level(&mut self, measured_n: f64, noise: &NoiseEstimator) {
-        self.belief.reset_component(L, measured_n, 1.0 / (1.0 - noise.rho * noise.rho));
+        self.state.reset_component(L, measured_n, 1.0 / (1.0 - noise.rho * noise.rho));
         self.last_n = measured_n;
         self.unpaired = true;
     }
@@ -149,7 +149,7 @@ impl ForcePredictor {
 
     /// Shifts the level because all later forces are larger by `by_n`.
     pub(super) fn shift_level(&mut self, by_n: f64) {
-        self.belief.x[L] += by_n;
+        self.state.x[L] += by_n;
         self.unpaired = true;
     }
 
@@ -157,7 +157,7 @@ impl ForcePredictor {
     /// through the acceleration, and its variance in units of the noise variance. Under constant acceleration the terms are
     /// not separable, but their sum is.
     pub(crate) fn rate(&self, speed_mps: f64, accel_mps2: f64, friction_ns_per_m: f64) -> (f64, f64) {
-        let g = &self.belief;
+        let g = &self.state;
         let (v, a) = (speed_mps, accel_mps2);
         let rate = g.x[R] + v * g.x[S] + a * (g.x[B] - friction_ns_per_m);
         let constant_speed = g.p[R][R] + v * (2.0 * g.cov(R, S) + v * g.p[S][S]);
@@ -167,13 +167,13 @@ impl ForcePredictor {
     /// Variance of the level and its covariance with [`ForcePredictor::rate`] at constant speed, in units of the noise
     /// variance.
     pub(crate) fn level_covariance(&self, speed_mps: f64) -> (f64, f64) {
-        let g = &self.belief;
+        let g = &self.state;
         (g.p[L][L], g.cov(L, R) + speed_mps * g.cov(L, S))
     }
 
     /// Predicted force in N.
     pub(crate) fn level_n(&self) -> f64 {
-        self.belief.x[L]
+        self.state.x[L]
     }
 }
 

@@ -158,7 +158,7 @@ impl LayerEstimator {
         let follows = self.log_density_of_free(true, noise) - initial_follows;
         let ends = self.log_density_of_free(false, noise) - initial_ends;
         self.layer_confirmed =
-            straight && self.belief.x[K] > 0.0 && follows.max(ends) < -CONFIRMATION_POWER * libm::log(odds);
+            straight && self.state.x[K] > 0.0 && follows.max(ends) < -CONFIRMATION_POWER * libm::log(odds);
         // Against a layer and the other hypothesis together, the latter weighted by the odds.
         let others = libm::log(odds * (1.0 + odds * libm::exp(follows.min(ends).min(MAX_LOG_ODDS_NATS))));
         if follows.max(ends) < others || !(follows + ends).is_finite() {
@@ -166,21 +166,21 @@ impl LayerEstimator {
         }
         self.tip_free = true;
         self.set_zero_stiffness();
-        let r = CONDITIONED_VARIANCE_FRACTION * self.belief.p[B][B];
+        let r = CONDITIONED_VARIANCE_FRACTION * self.state.p[B][B];
         let condition = if follows > ends {
-            self.belief.innovation([B, B_PREV], [1.0, -1.0], 0.0, r)
+            self.state.innovation([B, B_PREV], [1.0, -1.0], 0.0, r)
         } else {
-            self.belief.innovation([B], [1.0], 0.0, r)
+            self.state.innovation([B], [1.0], 0.0, r)
         };
-        self.belief.update(&condition);
+        self.state.update(&condition);
         true
     }
 
     /// Conditions the state on a layer without stiffness.
     fn set_zero_stiffness(&mut self) {
-        let r = CONDITIONED_VARIANCE_FRACTION * self.belief.p[K][K];
-        let zero = self.belief.innovation([K], [1.0], 0.0, r);
-        self.belief.update(&zero);
+        let r = CONDITIONED_VARIANCE_FRACTION * self.state.p[K][K];
+        let zero = self.state.innovation([K], [1.0], 0.0, r);
+        self.state.update(&zero);
     }
 }
 

@@ -40,7 +40,7 @@ pub(super) type LayerInnovation = Innovation<N>;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LayerEstimator {
-    pub(crate) belief: Gaussian<N>,
+    pub(crate) state: Gaussian<N>,
     /// Start of the active layer in m.
     pub(crate) start_m: f64,
     /// Ruptures so far.
@@ -64,7 +64,7 @@ pub(crate) struct LayerEstimator {
     /// Prior scale of the active layer's slope in N/m.
     slope_scale: f64,
     contact_drive: f64,
-    /// Position of the contact in m and its standard deviation, where the force in air tells.
+    /// Position of the contact in m and its standard deviation as estimated from the force in air.
     onset_m: Option<(f64, f64)>,
     /// Depth, drive, force and time since contact of the previous sample.
     last: Option<[f64; 4]>,
@@ -108,7 +108,7 @@ impl LayerEstimator {
         ];
         let mean = [half, 0.5 * slope, 0.5 * friction, half / drive, 0.0, noise.bias_n(), 0.0, 0.0];
         Self {
-            belief: Gaussian::new(mean, variance),
+            state: Gaussian::new(mean, variance),
             start_m,
             passed_count: 0,
             previous_thickness_m: 0.0,
@@ -135,7 +135,7 @@ impl LayerEstimator {
     /// Makes drift and line unknowns, with the covariance of `fit`; their fitted values are subtracted from the force from here on.
     pub(super) fn set_baseline(&mut self, fit: &BaselineFit, noise: &NoiseEstimator) {
         let unit = 1.0 / noise.variance;
-        let g = &mut self.belief;
+        let g = &mut self.state;
         for (i, row) in [BIAS, DRIFT, LINE].into_iter().zip(fit.p) {
             g.reset_component(i, if i == BIAS { noise.bias_n() } else { 0.0 }, row[i - BIAS] * unit);
         }
@@ -149,7 +149,7 @@ impl LayerEstimator {
 
     /// Adds a variance in N² to the sensor bias.
     pub(super) fn widen_bias(&mut self, variance: f64, noise: &NoiseEstimator) {
-        self.belief.p[BIAS][BIAS] += variance / noise.variance;
+        self.state.p[BIAS][BIAS] += variance / noise.variance;
     }
 
     /// Error of the subtracted drift and line at a position, in N, and its variance in N²; `None` with a constant baseline.
@@ -158,16 +158,16 @@ impl LayerEstimator {
         if !self.moving_baseline {
             return None;
         }
-        let (g, t, z) = (&self.belief, self.elapsed_s, position_m - self.contact_m);
+        let (g, t, z) = (&self.state, self.elapsed_s, position_m - self.contact_m);
         let variance = t * t * g.p[DRIFT][DRIFT] + z * (z * g.p[LINE][LINE] + 2.0 * t * g.p[LINE][DRIFT]);
         Some((t * g.x[DRIFT] + z * g.x[LINE], at_least(0.0, variance) * noise.variance))
     }
 
     fn transform(&mut self, map: &[[f64; N]; N]) {
-        self.belief = if self.moving_baseline {
-            self.belief.leading_transformed::<N>(map)
+        self.state = if self.moving_baseline {
+            self.state.leading_transformed::<N>(map)
         } else {
-            self.belief.leading_transformed::<WITHOUT_BASELINE>(map)
+            self.state.leading_transformed::<WITHOUT_BASELINE>(map)
         };
     }
 
@@ -181,7 +181,7 @@ impl LayerEstimator {
         if !self.moving_baseline {
             return Default::default();
         }
-        let g = &self.belief;
+        let g = &self.state;
         let sd = |i: usize| libm::sqrt(at_least(0.0, g.p[i][i]) * noise.variance);
         ([g.x[DRIFT], g.x[LINE]], [sd(DRIFT), sd(LINE)])
     }
@@ -200,15 +200,15 @@ impl LayerEstimator {
 
     /// Total friction per unit of drive, including the active layer.
     pub(crate) fn friction(&self, position_m: f64) -> f64 {
-        let passed = self.belief.x[if self.passed_count > 0 { D } else { K_PREV }];
-        passed + self.belief.x[B] * (position_m - self.start_m)
+        let passed = self.state.x[if self.passed_count > 0 { D } else { K_PREV }];
+        passed + self.state.x[B] * (position_m - self.start_m)
     }
 
     /// Force in N that the base law predicts.
     #[inline(always)]
     pub(crate) fn predict(&self, position_m: f64, drive: f64) -> f64 {
         let w = self.regressor(position_m - self.start_m, drive, self.elapsed_s);
-        w.iter().zip(&self.belief.x).map(|(w, x)| w * x).sum()
+        w.iter().zip(&self.state.x).map(|(w, x)| w * x).sum()
     }
 
     /// Measurement update; returns the innovation in N and its variance in units of the noise variance.
@@ -236,13 +236,13 @@ impl LayerEstimator {
         }
         if self.moving_baseline {
             let columns = [D, K, B, K_PREV, BIAS, DRIFT, LINE];
-            return self.belief.innovation(columns, columns.map(|i| w[i]), y, r);
+            return self.state.innovation(columns, columns.map(|i| w[i]), y, r);
         }
         if self.passed_count > 0 {
-            self.belief.leading_innovation::<R, 4>([D, K, B, BIAS], [w[D], w[K], w[B], w[BIAS]], y, r)
+            self.state.leading_innovation::<R, 4>([D, K, B, BIAS], [w[D], w[K], w[B], w[BIAS]], y, r)
         } else {
             let columns = [D, K, B, K_PREV, BIAS];
-            self.belief.leading_innovation::<R, 5>(columns, columns.map(|i| w[i]), y, r)
+            self.state.leading_innovation::<R, 5>(columns, columns.map(|i| w[i]), y, r)
         }
     }
 
@@ -256,9 +256,9 @@ impl LayerEstimator {
         force_n: f64,
     ) -> (f64, f64) {
         if self.moving_baseline {
-            self.belief.update(innovation);
+            self.state.update(innovation);
         } else {
-            self.belief.leading_update::<WITHOUT_BASELINE>(innovation);
+            self.state.leading_update::<WITHOUT_BASELINE>(innovation);
         }
         self.last = Some([position_m - self.start_m, drive, force_n, self.elapsed_s]);
         (innovation.e, innovation.s)
@@ -270,13 +270,13 @@ impl LayerEstimator {
 
     /// Slope of the force with travel in N/m.
     pub(crate) fn slope(&self, drive: f64) -> f64 {
-        self.belief.x[K] + self.belief.x[B] * drive
+        self.state.x[K] + self.state.x[B] * drive
     }
 
     /// Penalty in nats for negative stiffness or friction of the active and the previous layer: about minus the log probability that
     /// they are positive.
     pub(super) fn negative_nats(&self, noise: &NoiseEstimator) -> f64 {
-        let g = &self.belief;
+        let g = &self.state;
         let one = |i: usize| {
             let x = at_most(0.0, g.x[i]);
             0.5 * x * x / at_least(1e-300, g.p[i][i] * noise.variance)
@@ -287,7 +287,7 @@ impl LayerEstimator {
 
     /// Slope and its standard deviation.
     pub(super) fn slope_and_sd(&self, drive: f64, noise: &NoiseEstimator) -> (f64, f64) {
-        let g = &self.belief;
+        let g = &self.state;
         let variance = g.p[K][K] + drive * (2.0 * g.cov(B, K) + drive * g.p[B][B]);
         (self.slope(drive), libm::sqrt(at_least(0.0, variance) * noise.variance))
     }
@@ -307,15 +307,15 @@ impl LayerEstimator {
         let mut depth_at_contact = 0.0;
         if first {
             // Depth at which contact was detected: initial force over slope. It implies p = K depth.
-            let [p, k, b, q, ..] = self.belief.x;
+            let [p, k, b, q, ..] = self.state.x;
             let (force, slope) = (p + q * self.contact_drive, k + b * self.contact_drive);
             if force > 0.0 && slope > 0.0 {
                 depth_at_contact = self.depth_at_contact(force / slope).min(d);
-                let g = &self.belief.p;
+                let g = &self.state.p;
                 let u0 = self.contact_drive;
                 let variance = (g[D][D] + 2.0 * u0 * g[K_PREV][D] + u0 * u0 * g[K_PREV][K_PREV]).max(1e-6);
-                let constraint = self.belief.innovation([D, K], [1.0, -depth_at_contact], 0.0, variance);
-                self.belief.update(&constraint);
+                let constraint = self.state.innovation([D, K], [1.0, -depth_at_contact], 0.0, variance);
+                self.state.update(&constraint);
             }
         }
         let slope = if self.tip_free { self.slope_scale } else { self.slope(drive).abs().max(1.0) };
@@ -323,8 +323,8 @@ impl LayerEstimator {
             self.reopen_split(drive, unit);
         }
         let slope = slope.min(max_slope(unit));
-        let ruptured_friction = self.belief.x[B_PREV].max(0.0);
-        let b = at_least(-slope / drive, at_most(slope / drive, self.belief.x[B]));
+        let ruptured_friction = self.state.x[B_PREV].max(0.0);
+        let b = at_least(-slope / drive, at_most(slope / drive, self.state.x[B]));
         let stiffness = self.stiffness_rms(slope, unit);
         let mut map = [[0.0; N]; N];
         map[D][if first { K_PREV } else { D }] = 1.0;
@@ -338,7 +338,7 @@ impl LayerEstimator {
         if self.start_sd_m > 0.0 {
             // The bias estimate has absorbed the error in the ruptured layer's start.
             let variance = noise.bias_variance() + self.zero_step_variance;
-            self.belief.reset_component(BIAS, noise.bias_n(), variance * unit);
+            self.state.reset_component(BIAS, noise.bias_n(), variance * unit);
         }
         self.start_layer(slope, sd_m, (stiffness, b), drive, unit);
         (self.previous_start_sd_m, self.start_sd_m, self.gap_m) = (self.start_sd_m, 0.0, 0.0);
@@ -380,7 +380,7 @@ impl LayerEstimator {
     pub(super) fn reopen_split(&mut self, drive: f64, unit: f64) {
         let widest = max_slope(unit);
         let half = at_least(-widest, at_most(widest, 0.5 * self.slope(drive)));
-        let g = &mut self.belief;
+        let g = &mut self.state;
         (g.x[K], g.x[B]) = (g.x[K] + half, g.x[B] - half / drive);
         let variance = half * half * unit;
         g.p[K][K] += variance;
@@ -391,7 +391,7 @@ impl LayerEstimator {
 
     /// Root mean square of the active layer's stiffness in N/m, at most `max`.
     fn stiffness_rms(&self, max: f64, unit: f64) -> f64 {
-        let g = &self.belief;
+        let g = &self.state;
         libm::sqrt(g.x[K] * g.x[K] + g.p[K][K] / unit).min(max)
     }
 
@@ -406,7 +406,7 @@ impl LayerEstimator {
         unit: f64,
     ) {
         let wide = (3.0 * scale).min(max_slope(unit));
-        let g = &mut self.belief;
+        let g = &mut self.state;
         g.reset_component(K, 0.5 * scale, wide * wide * unit);
         g.reset_component(B, 0.5 * scale / drive, wide * wide / (drive * drive) * unit);
         // The uncertain place adds uncertain friction, and an uncertain elastic force that looks like a change of the bias.
@@ -429,7 +429,7 @@ impl LayerEstimator {
     ) {
         let unit = 1.0 / noise.variance;
         let travel = (position_m - self.start_m).max(0.0);
-        let b = self.belief.x[B];
+        let b = self.state.x[B];
         let mut map = [[0.0; N]; N];
         for (i, row) in map.iter_mut().enumerate() {
             row[i] = 1.0;
@@ -438,7 +438,7 @@ impl LayerEstimator {
         self.transform(&map);
         // The previous layer reaches to here if its friction kept growing.
         if let Some(slot) = self.passed_count.checked_sub(1).and_then(|i| passed_layers.get_mut(i))
-            && b > 0.5 * self.belief.x[B_PREV]
+            && b > 0.5 * self.state.x[B_PREV]
         {
             slot[1] = position_m;
             self.gap_m += travel;
@@ -448,7 +448,7 @@ impl LayerEstimator {
             self.start_sd_m = sd_m;
             self.start_layer(self.slope_scale, sd_m, (self.slope_scale, b), drive, unit);
         } else {
-            let g = &mut self.belief;
+            let g = &mut self.state;
             g.reset_component(B, 0.0, b * b * unit);
             g.p[D][D] += b * b * sd_m * sd_m * unit;
         }
@@ -458,7 +458,7 @@ impl LayerEstimator {
 
     /// Log density of the state, up to a constant, at `K = 0` and `b = b'` (`follows`) or `b = 0`.
     pub(super) fn log_density_of_free(&self, follows: bool, noise: &NoiseEstimator) -> f64 {
-        let g = &self.belief;
+        let g = &self.state;
         let (mut b, mut vb, mut cov) = (g.x[B], g.p[B][B], g.cov(B, K));
         if follows {
             b -= g.x[B_PREV];

@@ -13,7 +13,7 @@ impl LayerEstimator {
         if self.passed_count == 0 {
             return (0.0, 0.0);
         }
-        let g = &self.belief;
+        let g = &self.state;
         let (mut friction, mut variance) = (g.x[D], g.p[D][D]);
         if self.tip_free {
             let x = at_least(0.0, position_m - self.start_m);
@@ -35,7 +35,7 @@ impl LayerEstimator {
 
     /// Friction per drive of the passed layers at the last rupture, and its variance.
     pub(crate) fn friction_at_rupture(&self, noise: &NoiseEstimator) -> (f64, f64) {
-        let (g, gap) = (&self.belief, self.gap_m);
+        let (g, gap) = (&self.state, self.gap_m);
         let place = g.x[B_PREV] * self.gap_sd_m;
         // Friction of the active layer over its uncertain start is not separable from `D`.
         let start = g.x[B] * self.rupture_sd_m;
@@ -46,7 +46,7 @@ impl LayerEstimator {
 
     /// Total friction per unit of drive, including the active layer, and its standard deviation.
     pub(super) fn friction_and_sd(&self, position_m: f64, noise: &NoiseEstimator) -> (f64, f64) {
-        let (g, x) = (&self.belief, at_least(0.0, position_m - self.start_m));
+        let (g, x) = (&self.state, at_least(0.0, position_m - self.start_m));
         let passed = if self.passed_count > 0 { D } else { K_PREV };
         let variance = g.p[passed][passed] + x * (2.0 * g.cov(B, passed) + x * g.p[B][B]);
         (self.friction(position_m), libm::sqrt(at_least(0.0, variance) * noise.variance))
@@ -54,12 +54,12 @@ impl LayerEstimator {
 
     /// Growth of friction with travel while the shaft enters the previous layer, in N/m.
     pub(crate) fn friction_growth(&self, drive: f64) -> f64 {
-        (self.belief.x[B_PREV] * drive).abs()
+        (self.state.x[B_PREV] * drive).abs()
     }
 
     /// Variances of `K'` and `b'`.
     pub(crate) fn previous_variance(&self, noise: &NoiseEstimator) -> [f64; 2] {
-        [self.belief.p[K_PREV][K_PREV] * noise.variance, self.belief.p[B_PREV][B_PREV] * noise.variance]
+        [self.state.p[K_PREV][K_PREV] * noise.variance, self.state.p[B_PREV][B_PREV] * noise.variance]
     }
 
     /// Friction per drive during retraction with the tip at `z_m`, each passed layer's friction spread evenly over its
@@ -74,7 +74,7 @@ impl LayerEstimator {
         let count = self.passed_count.min(MAX_LAYERS);
         let (mut whole, mut inside) = (0.0, 0.0);
         for (i, [start, end, b]) in passed_layers.iter().take(count).enumerate() {
-            let b = if i + 1 == self.passed_count { self.belief.x[B_PREV].max(0.0) } else { *b };
+            let b = if i + 1 == self.passed_count { self.state.x[B_PREV].max(0.0) } else { *b };
             // A rupture may be located just before the estimated start of its layer.
             let length_m = at_least(0.0, end - start);
             whole += b * length_m;

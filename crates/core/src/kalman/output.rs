@@ -17,7 +17,7 @@ impl KalmanEnhancer {
     pub(super) fn report_previous_layer(&mut self, sample: &Sample) {
         let l = &self.estimator;
         let d = l.previous_thickness_m;
-        let [k, b] = [l.belief.x[K_PREV], l.belief.x[B_PREV]];
+        let [k, b] = [l.state.x[K_PREV], l.state.x[B_PREV]];
         let inflation = self.noise.interval_inflation();
         let [vk, vb] = l.previous_variance(&self.noise).map(|v| v * inflation);
         let (cumulative, cumulative_variance) = l.friction_at_rupture(&self.noise);
@@ -155,9 +155,9 @@ impl KalmanEnhancer {
             out.reconstructed_n = if self.in_tissue { sample.force_n - out.error_n } else { 0.0 };
             out.cusum_n2 = self.cusum.relative_level();
             if self.in_tissue {
-                let belief = &self.estimator.belief;
-                out.theta = [belief.x[K], belief.x[B]];
-                let sd = |i: usize| libm::sqrt((belief.p[i][i] * self.noise.variance).max(0.0));
+                let state = &self.estimator.state;
+                out.theta = [state.x[K], state.x[B]];
+                let sd = |i: usize| libm::sqrt((state.p[i][i] * self.noise.variance).max(0.0));
                 out.sd = [sd(K), sd(B), libm::sqrt(self.shaft_friction_variance.max(0.0))];
             }
         }

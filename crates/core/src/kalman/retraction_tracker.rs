@@ -163,7 +163,7 @@ mod tests {
     }
 
     /// Friction that stretches over millimetres and releases at `at`.
-    fn grip(at: f64) -> impl Fn(f64) -> f64 {
+    fn stretching_friction(at: f64) -> impl Fn(f64) -> f64 {
         move |x| if x < at { -1.5 + 3.5 * (-x / 2.5e-3).exp() } else { -0.4 }
     }
 
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn an_exact_model_leaves_no_residual() {
-        assert!(largest(&tip_n(grip(0.009), grip(0.009))) < 1e-9);
+        assert!(largest(&tip_n(stretching_friction(0.009), stretching_friction(0.009))) < 1e-9);
     }
 
     /// Viscous friction: force and model jump together at the turn, with or without a hold.
@@ -198,20 +198,20 @@ mod tests {
     #[test]
     fn a_release_a_millimetre_off_the_model_is_no_tip_force() {
         for at in [0.008, 0.0085, 0.0095, 0.010] {
-            let found = largest(&tip_n(grip(at), grip(0.009)));
+            let found = largest(&tip_n(stretching_friction(at), stretching_friction(0.009)));
             assert!(found < 0.2, "{found} N with a release at {at} m");
         }
     }
 
     #[test]
     fn a_release_in_the_model_alone_is_withheld() {
-        let found = largest(&tip_n(grip(1.0), grip(0.009)));
+        let found = largest(&tip_n(stretching_friction(1.0), stretching_friction(0.009)));
         assert!(found < 0.2, "{found} N");
     }
 
     #[test]
     fn a_model_off_by_a_fifth_is_corrected_over_millimetres() {
-        let tip = tip_n(grip(1.0), |x| 1.2 * grip(1.0)(x));
+        let tip = tip_n(stretching_friction(1.0), |x| 1.2 * stretching_friction(1.0)(x));
         assert!(largest(&tip) < 0.2, "{}", largest(&tip));
         let last = tip.iter().rev().take(40).map(|(_, t)| t.abs()).fold(0.0, f64::max);
         assert!(last < 0.05, "{last} of 0.3 N");
@@ -219,8 +219,8 @@ mod tests {
 
     #[test]
     fn a_caught_tip_keeps_two_thirds_of_its_pull_over_a_millimetre_with_a_model() {
-        let pulled = |x: f64| grip(1.0)(x) - if x > 0.0099 { 0.5 } else { 0.0 };
-        let tip = tip_n(pulled, grip(1.0));
+        let pulled = |x: f64| stretching_friction(1.0)(x) - if x > 0.0099 { 0.5 } else { 0.0 };
+        let tip = tip_n(pulled, stretching_friction(1.0));
         let at = |x: f64| tip.iter().find(|t| (t.0 - x).abs() < 1e-5).map_or(f64::NAN, |t| t.1);
         assert!((-0.5..-0.47).contains(&at(0.01)), "{}", at(0.01));
         // exp(-1/2.5) of it, less a tenth by the slope.

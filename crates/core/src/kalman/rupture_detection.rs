@@ -80,7 +80,7 @@ impl KalmanEnhancer {
             // Small falls are texture, or the contact is wrong.
             return size.fall_n >= at_least(size.min_n, UNCONFIRMED_DROP_SHARE * self.peak_force_n)
                 && self.snapshot.layer_confirmed
-                && self.contact_is_sure();
+                && self.is_contact_final();
         }
         size.fall_n >= size.min_n
     }
@@ -120,7 +120,7 @@ impl KalmanEnhancer {
         self.predictor.restart(sample.force_n, force, &self.noise, step.speed_mps, false);
         self.reset_detector();
         // A step of the zero does not continue, so this is a rupture.
-        self.rival = None;
+        self.zero_step_test = None;
         if let Some(post_rupture) = self.post_rupture {
             self.estimator = post_rupture;
         }
@@ -134,9 +134,9 @@ impl KalmanEnhancer {
         if self.next_report_at < u32::MAX {
             self.report_previous_layer(sample);
         }
-        self.decide_rival_at_rupture(sample, self.snapshot_m);
+        self.decide_zero_step_at_rupture(sample, self.snapshot_m);
         let bias = self.noise.bias_n();
-        self.rival = self.rival_of_rupture(sample);
+        self.zero_step_test = self.start_zero_step_test(sample);
         let (drop_n, sd_n) = self.last_drop_n;
         // Texture adds to the noise.
         let drop_sd_n = sd_n * libm::sqrt(self.innovation_widening());
@@ -158,8 +158,8 @@ impl KalmanEnhancer {
         (self.drop_onset, self.time_since_falling_s) = (None, f64::INFINITY);
         (self.pre_rupture, self.alarm_m) = (self.snapshot, sample.position_m);
         let after = self.estimator;
-        self.set_rupture(&after);
-        self.compare_rival(sample, step.rho);
+        self.set_rupture_hypothesis(&after);
+        self.update_zero_step_test(sample, step.rho);
         self.estimator.update(sample.position_m, self.friction_drive_mps, sample.force_n, step.rho);
         let force = (sample.force_n - bias).abs().max((predicted - sample.force_n).abs());
         self.predictor.restart(sample.force_n, force, &self.noise, step.speed_mps, false);

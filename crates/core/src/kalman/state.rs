@@ -9,7 +9,7 @@ use super::layer_estimator::{LayerEstimator, PassedLayers};
 use super::noise_estimator::NoiseEstimator;
 use super::shaft_friction::DryShaftFriction;
 use super::velocity_estimator::VelocityEstimator;
-use super::zero_step_state::{Jump, Rival};
+use super::zero_step_state::{Jump, ZeroStepTest};
 use crate::config::EnhanceConfig;
 use crate::sample::{Output, Sample};
 
@@ -56,14 +56,14 @@ pub(crate) struct KalmanEnhancer {
     pub(super) samples_above_threshold: u32,
     pub(super) samples_below_threshold: u32,
     /// Number of consecutive samples off the baseline at which the hypotheses in air are evaluated next.
-    pub(super) next_look_at: u32,
+    pub(super) next_air_evaluation_at: u32,
     pub(super) baseline: AirBaseline,
     /// The contact was configured, not detected, and is not revised.
     pub(super) contact_given: bool,
     pub(super) spike_samples: u8,
     pub(super) jump: Jump,
     /// The last rupture explained as a step of the sensor's zero instead.
-    pub(super) rival: Option<Rival>,
+    pub(super) zero_step_test: Option<ZeroStepTest>,
     /// The decision on the last sample, far from the prediction, waits for the next: the velocity may have jumped.
     pub(super) deferred: bool,
     /// Position in m of an alarm that was not declared because the needle may have stopped there.
@@ -157,12 +157,12 @@ impl KalmanEnhancer {
             low_passed_n: 0.0,
             samples_above_threshold: 0,
             samples_below_threshold: 0,
-            next_look_at: 0,
+            next_air_evaluation_at: 0,
             baseline: AirBaseline::new(noise.min_variance()),
             contact_given: false,
             spike_samples: 0,
             jump: Jump::default(),
-            rival: None,
+            zero_step_test: None,
             deferred: false,
             waiting_from_m: None,
             stop: None,
@@ -204,8 +204,8 @@ impl KalmanEnhancer {
         ];
         numbers.iter().sum::<f64>().is_finite()
             && self.noise.variance > 0.0
-            && self.predictor.belief.is_positive_definite()
-            && self.estimator.belief.is_positive_definite()
+            && self.predictor.state.is_positive_definite()
+            && self.estimator.state.is_positive_definite()
     }
 
     pub(crate) fn operation_count(&self) -> u32 {

@@ -18,7 +18,7 @@ impl KalmanEnhancer {
     /// `waiting_from_m` shows further motion.
     #[cold]
     pub(super) fn may_be_a_stop(&self, sample: &Sample, waiting_from_m: Option<f64>) -> bool {
-        if self.shown_stop().is_some() {
+        if self.confirmed_stop().is_some() {
             return false;
         }
         let shown_m = 2.0 * self.velocity_estimator.encoder_step_m();
@@ -60,13 +60,13 @@ impl KalmanEnhancer {
     #[cold]
     pub(super) fn is_late_friction(&self, sample: &Sample) -> bool {
         let margin_n = SPIKE_SDS * libm::sqrt(self.noise.marginal_variance());
-        self.shown_stop().is_some_and(|stop| {
+        self.confirmed_stop().is_some_and(|stop| {
             stop.duration_s <= MAX_FORCE_DELAY_S && sample.force_n > stop.lowest_n - margin_n
         })
     }
 
     /// The stop, if it has lasted longer than a rounded position stays the same.
-    fn shown_stop(&self) -> Option<Stop> {
+    fn confirmed_stop(&self) -> Option<Stop> {
         let rounding_m = 2.0 * self.velocity_estimator.encoder_step_m();
         self.stop.filter(|stop| stop.duration_s * self.speed_mps > rounding_m)
     }

@@ -16,9 +16,9 @@ pub(super) fn inside() -> KalmanEnhancer {
     let mut stylet = KalmanEnhancer::new(&EnhanceConfig::default(), 0.0);
     stylet.noise = NoiseEstimator::known(0.0, 4e-4, 0.07, 400.0);
     stylet.predictor = ForcePredictor::new(1.5);
-    stylet.predictor.belief = Gaussian::new([1.5, 0.0, 0.0, 0.0, 0.0], [3.0, 0.0, 0.0, 0.0, 0.0]);
+    stylet.predictor.state = Gaussian::new([1.5, 0.0, 0.0, 0.0, 0.0], [3.0, 0.0, 0.0, 0.0, 0.0]);
     stylet.estimator = LayerEstimator::at_contact(0.0, 0.0, 0.0, 100.0, 0.002, &stylet.noise);
-    stylet.estimator.belief = Gaussian::new(
+    stylet.estimator.state = Gaussian::new(
         [0.6, 60.0, 9000.0, 25.0, 0.0, 0.07, 0.0, 0.0],
         [0.0, 0.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0],
     );

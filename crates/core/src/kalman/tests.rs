@@ -80,8 +80,8 @@ fn a_state_that_is_not_finite_or_positive_definite_is_invalid() {
         |s, x| s.misfit = x,
         |s, x| s.roughness = x,
         |s, x| s.output.enhanced_n = x,
-        |s, x| s.predictor.belief.x[2] = x,
-        |s, x| s.estimator.belief.x[2] = x,
+        |s, x| s.predictor.state.x[2] = x,
+        |s, x| s.estimator.state.x[2] = x,
     ];
     for (n, spoil) in spoils.iter().enumerate() {
         for x in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
@@ -96,9 +96,9 @@ fn a_state_that_is_not_finite_or_positive_definite_is_invalid() {
         assert!(!stylet.is_numerically_valid());
     }
     let mut stylet = inside();
-    stylet.predictor.belief.p[1][1] = -1.0;
+    stylet.predictor.state.p[1][1] = -1.0;
     assert!(!stylet.is_numerically_valid());
     let mut stylet = inside();
-    stylet.estimator.belief.p[1][1] = -1.0;
+    stylet.estimator.state.p[1][1] = -1.0;
     assert!(!stylet.is_numerically_valid());
 }

@@ -146,7 +146,7 @@ impl KalmanEnhancer {
         }
         self.drop_continues = self.post_rupture.is_some() && self.drop_is_ongoing(step, sample);
         if self.drop_continues {
-            self.rival = None;
+            self.zero_step_test = None;
             if let Some(post_rupture) = self.post_rupture {
                 self.estimator = post_rupture;
             }
@@ -184,9 +184,9 @@ impl KalmanEnhancer {
             self.estimator.innovation(position_m, drive, force_n, step.rho)
         });
         let (e, s) = self.estimator.apply(&innovation, position_m, drive, force_n);
-        if self.rival.is_some() {
-            self.compare_rival(sample, step.rho);
-            if self.decide_rival(sample) {
+        if self.zero_step_test.is_some() {
+            self.update_zero_step_test(sample, step.rho);
+            if self.decide_zero_step(sample) {
                 return;
             }
         }
@@ -270,13 +270,13 @@ impl KalmanEnhancer {
         if !(self.noise.variance.is_finite() && self.noise.variance < 1e12) {
             self.noise = NoiseEstimator::new(config.contact_search.min_noise_n);
         }
-        if !self.predictor.belief.is_finite() {
+        if !self.predictor.state.is_finite() {
             self.predictor = ForcePredictor::new(sample.force_n);
             let force = (sample.force_n - self.noise.bias_n()).abs().max(1e-3);
             self.predictor.restart(sample.force_n, force, &self.noise, step.speed_mps, true);
             self.operations += OPERATIONS_PER_RUPTURE;
         }
-        if !self.estimator.belief.is_finite() {
+        if !self.estimator.state.is_finite() {
             self.estimator = LayerEstimator::at_contact(
                 sample.position_m,
                 0.0,

@@ -32,7 +32,7 @@ const EXTRAPOLATED_NOISE_RATIO: f64 = 3.25;
 /// encoder steps (half a step at either end, and an error of the log); number of changes by one step that confirm an encoder.
 const MIN_ENCODER_STEP_M: f64 = 1e-12;
 const ENCODER_STEPS: f64 = 1.5;
-const MIN_SIGHTINGS: u8 = 4;
+const MIN_OCCURRENCES: u8 = 4;
 
 /// Consecutive samples that must agree before the log is used again.
 const AGREEING_SAMPLES: u8 = 2;
@@ -53,7 +53,7 @@ pub(crate) struct VelocityEstimator {
     step_mps: [f64; 3],
     jumped: bool,
     /// The needle has not moved and is not logged as moving.
-    standing: bool,
+    at_rest: bool,
     /// Log and positions count as disagreeing for at least this many more samples: a jump of the velocity may cross a
     /// smoothed one.
     disagreeing: u8,
@@ -74,7 +74,7 @@ impl Default for VelocityEstimator {
             unmoved_m: 0.0,
             step_mps: [0.0; 3],
             jumped: false,
-            standing: false,
+            at_rest: false,
             disagreeing: 0,
             accurate_positions: false,
             smoothed_log: false,
@@ -97,11 +97,11 @@ impl VelocityEstimator {
         let dt_s = sample.time_s - last.time_s;
         let moved_m = sample.position_m - last.position_m;
         let before = core::mem::replace(&mut self.logged_mps, logged);
-        self.look_for_encoder_step(moved_m);
-        if moved_m == 0.0 && (self.standing || logged.abs() <= REST_SPEED_MPS) {
+        self.update_encoder_step(moved_m);
+        if moved_m == 0.0 && (self.at_rest || logged.abs() <= REST_SPEED_MPS) {
             // A velocity smoothed forward and backward in time rises before the needle moves.
             self.smoothed_log |= before.abs() > REST_SPEED_MPS && logged.abs() > REST_SPEED_MPS;
-            (self.standing, self.step_mps, self.jumped) = (true, [0.0; 3], false);
+            (self.at_rest, self.step_mps, self.jumped) = (true, [0.0; 3], false);
             return (0.0, false);
         }
         // A rounded position shows a stop where the needle should have moved by more than the rounding.
@@ -109,10 +109,10 @@ impl VelocityEstimator {
         self.unmoved_m = if moved_m == 0.0 { expected_m } else { 0.0 };
         let encoder_step_m = self.encoder_step_m();
         if encoder_step_m > 0.0 && self.unmoved_m > ENCODER_STEPS * encoder_step_m {
-            (self.standing, self.step_mps, self.jumped) = (true, [0.0; 3], false);
+            (self.at_rest, self.step_mps, self.jumped) = (true, [0.0; 3], false);
             return (0.0, true);
         }
-        let starts = core::mem::take(&mut self.standing);
+        let starts = core::mem::take(&mut self.at_rest);
         if dt_s <= 0.0 {
             return (logged, starts);
         }
@@ -153,13 +153,13 @@ impl VelocityEstimator {
 
     /// Step of the encoder in m; zero while unknown.
     pub(super) fn encoder_step_m(&self) -> f64 {
-        if self.sightings == MIN_SIGHTINGS { self.encoder_step_m } else { 0.0 }
+        if self.sightings == MIN_OCCURRENCES { self.encoder_step_m } else { 0.0 }
     }
 
     /// Updates the encoder step: travels of a rounded position differ by multiples of it, those of an exact one by arbitrarily small
     /// amounts.
     #[inline(always)]
-    fn look_for_encoder_step(&mut self, moved_m: f64) {
+    fn update_encoder_step(&mut self, moved_m: f64) {
         let change_m = (moved_m - core::mem::replace(&mut self.moved_m, moved_m)).abs();
         if change_m <= MIN_ENCODER_STEP_M || change_m > ENCODER_STEPS * self.encoder_step_m {
             return;
@@ -167,7 +167,7 @@ impl VelocityEstimator {
         if ENCODER_STEPS * change_m < self.encoder_step_m {
             (self.encoder_step_m, self.sightings) = (change_m, 0);
         }
-        if self.sightings < MIN_SIGHTINGS {
+        if self.sightings < MIN_OCCURRENCES {
             self.sightings += 1;
         }
     }

@@ -1,12 +1,12 @@
 //! Steps of the sensor's zero while the needle is in tissue. At a rupture the force drops by at most the elastic force, and another
 //! layer follows. A jump between two samples that goes up, or drops further than a rupture can, is accepted as a step of the zero at
-//! once. A drop that may be a rupture is declared as one; where the base law holds, a rival estimator assumes the old layer with
-//! another zero. If the rival predicts the force better, the rupture is withdrawn.
+//! once. A drop that may be a rupture is declared as one; where the base law holds, a second estimator assumes the old layer with
+//! another zero. If it predicts the force better, the rupture is withdrawn.
 
 use super::air_history::MIN_JUMP_SHARE;
 use super::layer_estimator::{BIAS, LayerEstimator};
 use super::state::{KalmanEnhancer, MAX_ALARM_MISFIT, MAX_DROP_DURATION_S, OPERATIONS_PER_RUPTURE};
-use super::zero_step_state::{Jump, Rival};
+use super::zero_step_state::{Jump, ZeroStepTest};
 use crate::bounds::{at_least, at_most};
 use crate::sample::{Sample, ZeroStep};
 
@@ -26,7 +26,7 @@ const DISMISSED_NATS: f64 = 5.0;
 /// Relative standard deviation of the size of a drop, from the uncertainty of the elastic force at a rupture.
 const DROP_SD_SHARE: f64 = 0.1;
 /// Travel in m after which a rupture is final.
-const MAX_RIVAL_TRAVEL_M: f64 = 12e-3;
+const MAX_ZERO_STEP_TEST_TRAVEL_M: f64 = 12e-3;
 
 impl KalmanEnhancer {
     /// Adds a sample that deviates from the prediction by `e_n`; true when the deviations show a step of the zero.
@@ -87,7 +87,7 @@ impl KalmanEnhancer {
         let known = self.estimator.passed_count > 0
             && !self.estimator.tip_free
             && self.post_rupture.is_none()
-            && self.rival.is_none()
+            && self.zero_step_test.is_none()
             && self.misfit < MAX_ALARM_MISFIT;
         if !known {
             return bias;
@@ -97,8 +97,9 @@ impl KalmanEnhancer {
         bias + at_least(0.0, least * self.friction_drive_mps)
     }
 
-    /// Rival of the rupture about to be declared, from the estimator before the drop. `None` if a step of the zero is excluded.
-    pub(super) fn rival_of_rupture(&self, sample: &Sample) -> Option<Rival> {
+    /// Starts the test of a step of the zero against the rupture about to be declared, from the estimator before the drop. `None` if a
+    /// step of the zero is excluded.
+    pub(super) fn start_zero_step_test(&self, sample: &Sample) -> Option<ZeroStepTest> {
         let candidate = self.candidate?;
         if self.misfit_weight > 0.0 || candidate.count > JUMP_SAMPLES || self.snapshot.tip_free {
             return None;
@@ -108,10 +109,10 @@ impl KalmanEnhancer {
             return None;
         }
         let mut estimator = self.snapshot;
-        let bias_n = estimator.belief.x[BIAS];
+        let bias_n = estimator.state.x[BIAS];
         estimator.widen_bias(drop_n * drop_n, &self.noise);
         estimator.skip_sample();
-        Some(Rival {
+        Some(ZeroStepTest {
             estimator,
             rupture: estimator,
             bias_n,
@@ -124,51 +125,54 @@ impl KalmanEnhancer {
     }
 
     /// Sets the estimator of the declared rupture, before its first sample.
-    pub(super) fn set_rupture(&mut self, after: &LayerEstimator) {
-        if let Some(rival) = &mut self.rival {
+    pub(super) fn set_rupture_hypothesis(&mut self, after: &LayerEstimator) {
+        if let Some(zero_step_test) = &mut self.zero_step_test {
             let uncertain_n = DROP_SD_SHARE * self.last_drop_n.0;
-            rival.rupture = *after;
-            rival.rupture.widen_bias(uncertain_n * uncertain_n, &self.noise);
+            zero_step_test.rupture = *after;
+            zero_step_test.rupture.widen_bias(uncertain_n * uncertain_n, &self.noise);
         }
     }
 
     /// Updates both explanations of the last rupture with a sample and accumulates their log-likelihood ratio.
     #[inline]
-    pub(super) fn compare_rival(&mut self, sample: &Sample, rho: f64) {
-        let Some(rival) = &mut self.rival else { return };
+    pub(super) fn update_zero_step_test(&mut self, sample: &Sample, rho: f64) {
+        let Some(zero_step_test) = &mut self.zero_step_test else { return };
         let (position_m, drive) = (sample.position_m, self.friction_drive_mps);
-        rival.estimator.elapsed_s = self.estimator.elapsed_s;
-        rival.rupture.elapsed_s = self.estimator.elapsed_s;
-        let (rival_e, rival_s) = rival.estimator.update(position_m, drive, sample.force_n, rho);
-        let (e, s) = rival.rupture.update(position_m, drive, sample.force_n, rho);
-        self.operations += RIVAL_OPERATIONS;
+        zero_step_test.estimator.elapsed_s = self.estimator.elapsed_s;
+        zero_step_test.rupture.elapsed_s = self.estimator.elapsed_s;
+        let (zero_step_e, zero_step_s) =
+            zero_step_test.estimator.update(position_m, drive, sample.force_n, rho);
+        let (e, s) = zero_step_test.rupture.update(position_m, drive, sample.force_n, rho);
+        self.operations += ZERO_STEP_TEST_OPERATIONS;
         let unit = 1.0 / self.noise.variance;
-        let ratio = libm::log(s / rival_s) + unit * (e * e / s - rival_e * rival_e / rival_s);
-        rival.nats += 0.5 * ratio;
+        let ratio = libm::log(s / zero_step_s) + unit * (e * e / s - zero_step_e * zero_step_e / zero_step_s);
+        zero_step_test.nats += 0.5 * ratio;
     }
 
     /// Decides between the explanations of the last rupture. True when it was withdrawn.
     #[inline]
-    pub(super) fn decide_rival(&mut self, sample: &Sample) -> bool {
-        let Some(rival) = &self.rival else { return false };
+    pub(super) fn decide_zero_step(&mut self, sample: &Sample) -> bool {
+        let Some(zero_step_test) = &self.zero_step_test else { return false };
         // Stiffness and friction are not negative.
-        let nats = rival.nats + rival.rupture.negative_nats(&self.noise)
-            - rival.estimator.negative_nats(&self.noise);
+        let nats = zero_step_test.nats + zero_step_test.rupture.negative_nats(&self.noise)
+            - zero_step_test.estimator.negative_nats(&self.noise);
         // While an ordinary drop may continue, its first part looks like a step.
         if nats > ACCEPTED_NATS && self.time_since_rupture_s > MAX_DROP_DURATION_S {
             self.withdraw_rupture();
             return true;
         }
-        if nats < -DISMISSED_NATS || sample.position_m - rival.at.position_m > MAX_RIVAL_TRAVEL_M {
-            self.rival = None;
+        if nats < -DISMISSED_NATS
+            || sample.position_m - zero_step_test.at.position_m > MAX_ZERO_STEP_TEST_TRAVEL_M
+        {
+            self.zero_step_test = None;
         }
         false
     }
 
     /// Decides on the last rupture when another follows. The new drop shows how much of the force was elastic, and so the friction
     /// under either explanation; the last rupture is withdrawn if its friction would be negative.
-    pub(super) fn decide_rival_at_rupture(&mut self, sample: &Sample, rupture_m: f64) {
-        let Some(rival) = self.rival else { return };
+    pub(super) fn decide_zero_step_at_rupture(&mut self, sample: &Sample, rupture_m: f64) {
+        let Some(zero_step_test) = self.zero_step_test else { return };
         let negative_nats = |mut estimator: LayerEstimator| {
             let mut passed_layers = self.passed_layers;
             let drive = at_least(1e-6, self.steady_drive_mps);
@@ -176,7 +180,8 @@ impl KalmanEnhancer {
             estimator.update(sample.position_m, self.friction_drive_mps, sample.force_n, 0.0);
             estimator.negative_nats(&self.noise)
         };
-        let nats = rival.nats + negative_nats(rival.rupture) - negative_nats(rival.estimator);
+        let nats = zero_step_test.nats + negative_nats(zero_step_test.rupture)
+            - negative_nats(zero_step_test.estimator);
         self.operations += 2 * OPERATIONS_PER_RUPTURE;
         if nats > ACCEPTED_NATS {
             self.withdraw_rupture();
@@ -186,20 +191,20 @@ impl KalmanEnhancer {
     /// Withdraws the last rupture, which was a step of the zero.
     #[cold]
     fn withdraw_rupture(&mut self) {
-        let Some(rival) = self.rival.take() else { return };
+        let Some(zero_step_test) = self.zero_step_test.take() else { return };
         let withdrawn = self.output.ruptures;
-        let size_n = rival.estimator.belief.x[BIAS] - rival.bias_n;
-        let variance = rival.estimator.belief.p[BIAS][BIAS] * self.noise.variance;
-        self.estimator = rival.estimator;
-        self.estimator.belief.x[BIAS] = rival.bias_n;
+        let size_n = zero_step_test.estimator.state.x[BIAS] - zero_step_test.bias_n;
+        let variance = zero_step_test.estimator.state.p[BIAS][BIAS] * self.noise.variance;
+        self.estimator = zero_step_test.estimator;
+        self.estimator.state.x[BIAS] = zero_step_test.bias_n;
         self.estimator.zero_step_variance = variance;
         self.baseline.subtract_step(size_n);
         self.predictor.shift_level(-size_n);
         self.skip_sample();
         self.output.ruptures = self.output.ruptures.saturating_sub(1);
-        (self.output.contact_m, self.output.contact_sd_m) = rival.contact;
-        self.dry_friction = rival.dry_friction;
-        (self.samples_since_rupture, self.next_report_at, self.time_since_rupture_s) = rival.counts;
+        (self.output.contact_m, self.output.contact_sd_m) = zero_step_test.contact;
+        self.dry_friction = zero_step_test.dry_friction;
+        (self.samples_since_rupture, self.next_report_at, self.time_since_rupture_s) = zero_step_test.counts;
         (self.post_rupture, self.drop_continues, self.drop_onset) = (None, false, None);
         (self.continued_drop, self.output.completed_drop) = (None, None);
         self.free_tip.restart_from(&self.estimator);
@@ -207,8 +212,8 @@ impl KalmanEnhancer {
         (self.snapshot, self.snapshot_m) = (self.estimator, self.last_sample.position_m);
         self.output.estimate = None;
         self.output.zero_step = Some(ZeroStep {
-            time_s: rival.at.time_s,
-            position_m: rival.at.position_m,
+            time_s: zero_step_test.at.time_s,
+            position_m: zero_step_test.at.position_m,
             size_n,
             sd_n: libm::sqrt(at_least(0.0, variance)),
             in_tissue: true,
@@ -217,8 +222,8 @@ impl KalmanEnhancer {
     }
 }
 
-/// Multiplications and additions of a sample of the rival.
-const RIVAL_OPERATIONS: u32 = 2 * (2 * 56 + 2 * 44) + 40;
+/// Multiplications and additions of the test per sample.
+const ZERO_STEP_TEST_OPERATIONS: u32 = 2 * (2 * 56 + 2 * 44) + 40;
 
 #[cfg(test)]
 mod tests;

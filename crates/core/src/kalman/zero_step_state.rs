@@ -18,9 +18,9 @@ pub(super) struct Jump {
     pub(super) start: Sample,
 }
 
-/// Competing explanations of the last rupture: step of the zero, and rupture.
+/// Test of two hypotheses on the last rupture: a step of the zero, or a rupture.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Rival {
+pub(super) struct ZeroStepTest {
     /// The old layer with another zero.
     pub(super) estimator: LayerEstimator,
     /// The new layer after a drop of uncertain size.

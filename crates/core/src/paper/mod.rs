@@ -174,7 +174,7 @@ impl PaperEnhancer {
     pub(crate) fn step_brief(&mut self, ring: &mut SampleRing<impl Storage>, sample: Sample) -> &Output {
         let mut flags = SampleFlags::default();
         self.preprocessor.process(&self.config, sample, &mut flags);
-        self.take(ring, sample, flags);
+        self.process_ready_sample(ring, sample, flags);
         &self.out
     }
 
@@ -193,7 +193,7 @@ impl PaperEnhancer {
                 self.preprocessor.process(&self.config, *sample, flags);
             }
             for (flags, sample) in flags.iter().zip(block) {
-                self.take(ring, *sample, *flags);
+                self.process_ready_sample(ring, *sample, *flags);
                 each(&self.out);
             }
         }
@@ -201,7 +201,12 @@ impl PaperEnhancer {
     }
 
     #[inline(always)]
-    fn take(&mut self, ring: &mut SampleRing<impl Storage>, sample: Sample, flags: SampleFlags) {
+    fn process_ready_sample(
+        &mut self,
+        ring: &mut SampleRing<impl Storage>,
+        sample: Sample,
+        flags: SampleFlags,
+    ) {
         self.out.detection = None;
         self.out.estimate = None;
         self.out.restarted = false;

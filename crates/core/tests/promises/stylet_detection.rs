@@ -128,7 +128,7 @@ fn friction_is_compensated_a_twentieth_of_a_second_after_the_drop() {
 }
 
 #[test]
-fn a_knock_gives_no_layer_estimate() {
+fn an_impact_gives_no_layer_estimate() {
     // A step up and back: a knock against the robot.
     let mut data = insertion(&gels(), -0.005, 14.0, 200.0, 0.02, 1, |_| 0.0023);
     assert!(data.ruptures.is_empty());

@@ -117,7 +117,7 @@ fn the_friction_after_a_rupture_lies_in_its_interval() {
 }
 
 #[test]
-fn a_needle_at_rest_stands_whatever_a_smoothed_velocity_shows() {
+fn a_needle_at_rest_has_zero_velocity_although_a_smoothed_log_does_not() {
     // Smoothed forward and backward in time, the velocity rises before the needle moves. Frequent stops make disagreement usual.
     let stop = |t: f64| if t > 13.0 && t % 2.0 < 0.5 { 0.0 } else { 0.0023 };
     for seed in 0..10 {

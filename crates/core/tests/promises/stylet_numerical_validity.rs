@@ -68,7 +68,7 @@ fn insertion_count(usual: u64) -> u64 {
 }
 
 #[test]
-fn the_papers_algorithm_survives_corrupted_logs() {
+fn the_papers_algorithm_continues_after_corrupted_samples() {
     for seed in 0..insertion_count(30) {
         let config = EnhanceConfig { algorithm: Algorithm::Paper, ..EnhanceConfig::default() };
         let mut core = Enhancer::new(config, 0.0, vec![Sample::default(); 4096]);

@@ -85,7 +85,7 @@ fn a_jump_that_no_rupture_can_make_is_a_step_of_the_zero_at_once() {
 }
 
 #[test]
-fn a_drop_that_was_a_step_is_withdrawn_and_the_old_layer_goes_on() {
+fn a_drop_that_was_a_zero_step_is_withdrawn_and_the_old_layer_continues() {
     for seed in 0..SEEDS {
         let plain = enhance(&stylet(), &with_step(seed, 0.0, 8.0, 1.0).samples);
         for (size_n, at_s) in [(-0.2, 20.0), (-0.3, 20.0), (-0.2, 28.0), (-0.3, 28.0)] {
@@ -163,7 +163,7 @@ fn a_rise_over_several_samples_or_within_the_noise_is_no_step() {
 }
 
 #[test]
-fn a_jump_that_goes_on_growing_is_no_step() {
+fn a_jump_that_keeps_growing_is_no_step() {
     for seed in 0..SEEDS {
         // Growth per sample over three samples, less and more than a third of the jump and the noise.
         for (jump_n, growth_n, is_step) in

@@ -1,9 +1,9 @@
 //! Identifier of a case: all its properties are functions of these words and numbers.
 
-use crate::words::words;
+use crate::named_enum::named_enum;
 use serde::{Deserialize, Serialize};
 
-words! {
+named_enum! {
     /// Tissue law of the simulator.
     World {
         Plain = "plain": "the equations of docs/reference/model.md, implemented a second time",
@@ -11,7 +11,7 @@ words! {
     }
 }
 
-words! {
+named_enum! {
     /// Misspecification of the assumed scenario or of the sensor.
     Wrong {
         Nothing = "nothing": "nothing wrong: K, b, F known to 5 %, geometry exact, white or AR(1) noise, 200 Hz",
@@ -45,7 +45,7 @@ words! {
     }
 }
 
-words! {
+named_enum! {
     /// Severity of the misspecification.
     Severity {
         Small = "small": "the first of the three amounts",
@@ -54,7 +54,7 @@ words! {
     }
 }
 
-words! {
+named_enum! {
     /// Hidden causes of a case.
     Hide {
         Clean = "clean": "nothing",
@@ -76,7 +76,7 @@ impl Hide {
     };
 }
 
-words! {
+named_enum! {
     /// Strength of the hidden causes: RMS residual of the re-fitted base law.
     Size {
         Faint = "faint": "0.15 to 0.5 standard deviations of the noise",

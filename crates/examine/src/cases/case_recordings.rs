@@ -51,7 +51,7 @@ pub struct Case {
     /// Input of the engine.
     pub question: Question,
     /// The insertion of each recording, without noise.
-    pub there: Vec<Insertion>,
+    pub insertions: Vec<Insertion>,
 }
 
 /// Generates a case.
@@ -72,17 +72,17 @@ pub fn make_case_with(
     let setup = set_up_case(id, custom);
     let mut rng = ChaCha8Rng::seed_from_u64(id.case_seed());
     rng.set_stream(0);
-    let (mut recordings, mut there) = (Vec::new(), Vec::new());
+    let (mut recordings, mut insertions) = (Vec::new(), Vec::new());
     for (k, path) in setup.paths.iter().enumerate() {
         let mut recording_rng = ChaCha8Rng::seed_from_u64(rng.random());
         let (recording, insertion) = measure(&setup, path, &mut recording_rng)?;
         recordings.push(NamedFile { name: format!("{}.csv", k + 1), recording });
-        there.push(insertion);
+        insertions.push(insertion);
     }
     let name = format!("case {:016x}", id.case_seed());
     let scenario = || draw_tissue::scenario_ron(&name, &setup.assumed, setup.amounts.rate_hz);
     let assumed_ron = setup.amounts.has_scenario.then(scenario);
-    Ok(Case { id: *id, question: Question { name, assumed_ron, recordings }, setup, there })
+    Ok(Case { id: *id, question: Question { name, assumed_ron, recordings }, setup, insertions })
 }
 
 /// Sample times in s, with jitter and dropped samples.
@@ -128,23 +128,23 @@ pub(crate) fn measure(
     let mut strange = setup.shape.clone();
     let strange = strange.as_mut().map(|s| s as &mut dyn UnmodelledForce);
     let step_s = STEP_S.min(interval_s / STEPS_PER_SAMPLE);
-    let there = simulate_insertion(law.as_mut(), &instrument, strange, path, &at, step_s);
+    let insertion = simulate_insertion(law.as_mut(), &instrument, strange, path, &at, step_s);
     let mut noise = setup.noise.clone();
     noise.spikes = setup.effects.iter().find_map(|e| match *e {
         Effect::ForceSpikes { rate_hz, size_n } => Some((rate_hz, size_n)),
         _ => None,
     });
     let mut source = NoiseGenerator::new(&noise, &mut noise_rng);
-    let force: Vec<f64> = there
+    let force: Vec<f64> = insertion
         .time_s
         .iter()
-        .zip(&there.force_n)
+        .zip(&insertion.force_n)
         .map(|(&t, &f)| {
             let e = source.next(t, f, interval_s);
             instrument.reading_n(t, f, e)
         })
         .collect();
-    let position: Vec<f64> = there
+    let position: Vec<f64> = insertion
         .position_m
         .iter()
         .map(|&z| {
@@ -154,7 +154,7 @@ pub(crate) fn measure(
             if q > 0.0 { libm::round(z / q) * q } else { z }
         })
         .collect();
-    Ok((Recording::new(there.time_s.clone(), position, force)?, there))
+    Ok((Recording::new(insertion.time_s.clone(), position, force)?, insertion))
 }
 
 impl Case {

@@ -14,7 +14,7 @@ pub trait CustomEffect: Debug + Send + Sync {
     fn parameters(&self) -> Vec<(String, f64)>;
 
     /// The effect with other parameters than the typical ones, drawn by uniform numbers in 0..1.
-    fn drawn(&self, uniform: &mut dyn FnMut() -> f64) -> Arc<dyn CustomEffect>;
+    fn with_random_parameters(&self, uniform: &mut dyn FnMut() -> f64) -> Arc<dyn CustomEffect>;
 
     /// The effect `factor` times as strong, within its allowed values.
     fn scaled(&self, factor: f64) -> Arc<dyn CustomEffect>;

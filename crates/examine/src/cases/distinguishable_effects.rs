@@ -14,10 +14,11 @@ pub fn is_clear_of_ruptures(setup: &CaseSetup) -> bool {
         Effect::HiddenMembrane { depth_m, stiffness_n_per_m, puncture_n } => {
             let breaks_m = setup.truth.surface_m + depth_m + puncture_n / stiffness_n_per_m;
             breaks_m < setup.truth.end_m()
-                && simulate_effects(setup, &setup.effects, None).iter().all(|(there, _)| {
-                    there.ruptures_s.iter().all(|r| {
-                        let k = there.time_s.partition_point(|t| t < r).min(there.position_m.len() - 1);
-                        (there.position_m[k] - breaks_m).abs() > MEMBRANE_APART_M
+                && simulate_effects(setup, &setup.effects, None).iter().all(|(insertion, _)| {
+                    insertion.ruptures_s.iter().all(|r| {
+                        let k =
+                            insertion.time_s.partition_point(|t| t < r).min(insertion.position_m.len() - 1);
+                        (insertion.position_m[k] - breaks_m).abs() > MEMBRANE_APART_M
                     })
                 })
         }
@@ -42,10 +43,10 @@ pub fn is_identified_by_ruptures(setup: &CaseSetup, size: Size) -> bool {
         let layer = &setup.truth.layers[i];
         let front = setup.truth.front_m(i);
         let mut forces = Vec::new();
-        for (there, _) in &all {
-            let Some(r) = there.ruptures_s.get(i) else { continue };
-            let k = there.time_s.partition_point(|t| t < r).min(there.position_m.len() - 1);
-            let x = there.position_m[k] - front;
+        for (insertion, _) in &all {
+            let Some(r) = insertion.ruptures_s.get(i) else { continue };
+            let k = insertion.time_s.partition_point(|t| t < r).min(insertion.position_m.len() - 1);
+            let x = insertion.position_m[k] - front;
             if x < 0.97 * layer.thickness_m {
                 forces.push(x * layer.stiffness_n_per_m);
             }

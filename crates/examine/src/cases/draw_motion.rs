@@ -27,31 +27,32 @@ pub fn draw_motions(
     depth_m: f64,
     hurry: f64,
 ) -> Vec<MotionPath> {
-    let way = Way { start_m, depth_m, pace: hurry * ((depth_m - start_m) / USUAL_DEPTH_M).max(0.5) };
+    let range =
+        MotionRange { start_m, depth_m, pace: hurry * ((depth_m - start_m) / USUAL_DEPTH_M).max(0.5) };
     (0..count)
         .map(|k| match (count, k % 4) {
-            (1, _) | (_, 2 | 3) => way.program(rng),
-            (2, 1) => way.program(rng),
-            (_, 0) => way.constant(rng),
-            _ => way.swing(rng),
+            (1, _) | (_, 2 | 3) => range.program(rng),
+            (2, 1) => range.program(rng),
+            (_, 0) => range.constant(rng),
+            _ => range.sinusoid(rng),
         })
         .collect()
 }
 
 /// Six repeats: three motions, each twice.
 pub fn draw_repeats(rng: &mut ChaCha8Rng, start_m: f64, depth_m: f64) -> Vec<MotionPath> {
-    let way = Way { start_m, depth_m, pace: ((depth_m - start_m) / USUAL_DEPTH_M).max(0.5) };
-    let three = [way.constant(rng), way.program(rng), way.constant(rng)];
+    let range = MotionRange { start_m, depth_m, pace: ((depth_m - start_m) / USUAL_DEPTH_M).max(0.5) };
+    let three = [range.constant(rng), range.program(rng), range.constant(rng)];
     three.iter().chain(&three).cloned().collect()
 }
 
-struct Way {
+struct MotionRange {
     start_m: f64,
     depth_m: f64,
     pace: f64,
 }
 
-impl Way {
+impl MotionRange {
     fn length_m(&self) -> f64 {
         self.depth_m - self.start_m
     }
@@ -69,7 +70,7 @@ impl Way {
         )
     }
 
-    fn swing(&self, rng: &mut ChaCha8Rng) -> MotionPath {
+    fn sinusoid(&self, rng: &mut ChaCha8Rng) -> MotionPath {
         let frequency_hz =
             self.pace * uniform(rng, 0.0115, 0.0167) * USUAL_DEPTH_M / self.length_m().max(0.05);
         let duration_s = uniform(rng, 0.65, 0.9) / frequency_hz;

@@ -68,7 +68,7 @@ fn rounded(l: Layer) -> Layer {
 }
 
 /// A random error of 0.5 to 1 times `size`, of either sign.
-fn off(rng: &mut ChaCha8Rng, size: f64) -> f64 {
+fn signed_error(rng: &mut ChaCha8Rng, size: f64) -> f64 {
     let sign = if rng.random::<bool>() { 1.0 } else { -1.0 };
     sign * size * uniform(rng, 0.5, 1.0)
 }
@@ -76,12 +76,12 @@ fn off(rng: &mut ChaCha8Rng, size: f64) -> f64 {
 /// Draws the true stack. The draws do not depend on the amounts, so that the same insertion occurs at every severity.
 pub fn draw_true_tissue(rng: &mut ChaCha8Rng, assumed: &Tissue, amounts: &MisspecificationAmounts) -> Tissue {
     let mut truth = assumed.clone();
-    truth.surface_m += off(rng, 1.0) * amounts.surface_m;
+    truth.surface_m += signed_error(rng, 1.0) * amounts.surface_m;
     for layer in &mut truth.layers {
-        layer.thickness_m *= 1.0 + off(rng, 1.0) * amounts.thickness;
-        layer.stiffness_n_per_m *= 1.0 + off(rng, 1.0) * amounts.coefficients;
-        layer.friction_ns_per_m2 *= 1.0 + off(rng, 1.0) * amounts.coefficients;
-        let factor = 1.0 + off(rng, 1.0) * amounts.coefficients;
+        layer.thickness_m *= 1.0 + signed_error(rng, 1.0) * amounts.thickness;
+        layer.stiffness_n_per_m *= 1.0 + signed_error(rng, 1.0) * amounts.coefficients;
+        layer.friction_ns_per_m2 *= 1.0 + signed_error(rng, 1.0) * amounts.coefficients;
+        let factor = 1.0 + signed_error(rng, 1.0) * amounts.coefficients;
         // Below the elastic force at the far face, so that a layer with a puncture force ruptures by force.
         let most = 0.95 * layer.stiffness_n_per_m * layer.thickness_m;
         layer.puncture_n = layer.puncture_n.map(|f| (f * factor).min(most));
@@ -96,12 +96,12 @@ pub fn draw_guessed_tissue(
     amounts: &MisspecificationAmounts,
 ) -> Tissue {
     let mut guess = assumed.clone();
-    let mut off = || log_uniform(rng, 1.0 / amounts.guess, amounts.guess);
+    let mut factor = || log_uniform(rng, 1.0 / amounts.guess, amounts.guess);
     for layer in &mut guess.layers {
-        layer.thickness_m *= off();
-        layer.stiffness_n_per_m *= off();
-        layer.friction_ns_per_m2 *= off();
-        layer.puncture_n = layer.puncture_n.map(|f| f * off());
+        layer.thickness_m *= factor();
+        layer.stiffness_n_per_m *= factor();
+        layer.friction_ns_per_m2 *= factor();
+        layer.puncture_n = layer.puncture_n.map(|f| f * factor());
     }
     guess
 }
@@ -126,7 +126,7 @@ pub fn draw_encountered_tissue(
         let factor = 1.0 + amounts.scatter_puncture * normal();
         layer.puncture_n = layer.puncture_n.map(|f| f * factor);
     }
-    it.surface_m += off(rng, amounts.surface_each_m);
+    it.surface_m += signed_error(rng, amounts.surface_each_m);
     it
 }
 

@@ -12,9 +12,9 @@ use crate::simulator::plain_world::sgn;
 use crate::simulator::tissue::Tissue;
 
 /// Sample rate in Hz at which strengths are computed.
-const LOOK_HZ: f64 = 50.0;
+const STRENGTH_RATE_HZ: f64 = 50.0;
 /// Largest step of these simulations in s.
-const LOOK_STEP_S: f64 = 2e-3;
+const STRENGTH_STEP_S: f64 = 2e-3;
 
 /// Terms that are re-fitted together with the base law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,15 +39,16 @@ pub fn simulate_effects(
         .paths
         .iter()
         .map(|path| {
-            let n = (path.duration_s() * LOOK_HZ) as usize;
-            let at: Vec<f64> = (0..n).map(|k| k as f64 / LOOK_HZ).collect();
+            let n = (path.duration_s() * STRENGTH_RATE_HZ) as usize;
+            let at: Vec<f64> = (0..n).map(|k| k as f64 / STRENGTH_RATE_HZ).collect();
             let mut law = setup.law(&setup.truth, effects);
             let mut strange = shape.cloned();
             let strange = strange.as_mut().map(|s| s as &mut dyn UnmodelledForce);
-            let there = simulate_insertion(law.as_mut(), &instrument, strange, path, &at, LOOK_STEP_S);
+            let insertion =
+                simulate_insertion(law.as_mut(), &instrument, strange, path, &at, STRENGTH_STEP_S);
             let read =
-                at.iter().zip(&there.force_n).map(|(&t, &f)| instrument.reading_n(t, f, 0.0)).collect();
-            (there, read)
+                at.iter().zip(&insertion.force_n).map(|(&t, &f)| instrument.reading_n(t, f, 0.0)).collect();
+            (insertion, read)
         })
         .collect()
 }
@@ -68,13 +69,13 @@ pub fn unexplained_rms_n(
 ) -> f64 {
     let mut fit = LeastSquares::default();
     let mut row = Vec::new();
-    for (there, read) in simulate_effects(setup, effects, shape) {
+    for (insertion, read) in simulate_effects(setup, effects, shape) {
         for (k, force) in read.into_iter().enumerate() {
-            columns(&mut row, &setup.truth, &there, k, terms);
+            columns(&mut row, &setup.truth, &insertion, k, terms);
             fit.add(&row, force);
         }
     }
-    let mut square = fit.left_square();
+    let mut square = fit.mean_square_residual();
     for effect in effects {
         if let Effect::ForceSpikes { rate_hz, size_n } = *effect {
             square += rate_hz / setup.amounts.rate_hz * size_n * size_n;
@@ -83,9 +84,9 @@ pub fn unexplained_rms_n(
     square.sqrt()
 }
 
-fn columns(row: &mut Vec<f64>, tissue: &Tissue, there: &Insertion, k: usize, terms: RefitTerms) {
-    let (t, z, v) = (there.time_s[k], there.position_m[k], there.velocity_mps[k]);
-    let ruptured = there.ruptures_s.iter().filter(|r| **r <= t).count();
+fn columns(row: &mut Vec<f64>, tissue: &Tissue, insertion: &Insertion, k: usize, terms: RefitTerms) {
+    let (t, z, v) = (insertion.time_s[k], insertion.position_m[k], insertion.velocity_mps[k]);
+    let ruptured = insertion.ruptures_s.iter().filter(|r| **r <= t).count();
     row.clear();
     let mut inside = 0.0;
     for (i, layer) in tissue.layers.iter().enumerate() {
@@ -108,7 +109,7 @@ fn columns(row: &mut Vec<f64>, tissue: &Tissue, there: &Insertion, k: usize, ter
                 1.0,
                 t,
                 sgn(v),
-                there.acceleration_mps2[k],
+                insertion.acceleration_mps2[k],
                 cut,
                 active,
                 v * v * sgn(v) * inside,
@@ -145,7 +146,7 @@ impl LeastSquares {
     }
 
     /// Mean square of the residual. Columns spanned by earlier ones are left out.
-    fn left_square(mut self) -> f64 {
+    fn mean_square_residual(mut self) -> f64 {
         let n = self.product.len();
         let own: Vec<f64> = (0..n).map(|i| self.gram[i][i]).collect();
         let mut left = self.square;
@@ -180,6 +181,6 @@ mod tests {
             let x = f64::from(k) * 0.01;
             fit.add(&[1.0, x, 2.0 * x], 3.0 - 0.5 * x + 0.1 * if k % 2 == 0 { 1.0 } else { -1.0 });
         }
-        assert!((fit.left_square().sqrt() - 0.1).abs() < 1e-4);
+        assert!((fit.mean_square_residual().sqrt() - 0.1).abs() < 1e-4);
     }
 }

@@ -17,7 +17,7 @@ use std::sync::Arc;
 const SCALING_STEPS: usize = 5;
 
 /// Whether a tissue can have an effect: boundaries need two layers, puncture effects a layer that is punctured.
-fn fits(effect: &Effect, setup: &CaseSetup) -> bool {
+fn can_hold(effect: &Effect, setup: &CaseSetup) -> bool {
     let punctured = setup.truth.layers.iter().any(|l| l.puncture_n.is_some());
     match effect {
         Effect::BoundaryShift { .. } => setup.truth.layers.len() > 1,
@@ -27,7 +27,7 @@ fn fits(effect: &Effect, setup: &CaseSetup) -> bool {
 }
 
 /// Whether two effects can be distinguished when both are present: they differ, and belong to different families.
-fn apart(a: &Effect, b: &Effect) -> bool {
+fn are_distinguishable(a: &Effect, b: &Effect) -> bool {
     const FAMILIES: [&[&str]; 4] = [
         &["coulomb_friction", "stribeck_friction", "presliding_friction"],
         &["boundary_shift", "position_scale"],
@@ -38,7 +38,7 @@ fn apart(a: &Effect, b: &Effect) -> bool {
 }
 
 /// Instrument faults.
-const INSTRUMENT: [&str; 10] = [
+const INSTRUMENT_FAULTS: [&str; 10] = [
     "force_gain",
     "force_bias",
     "force_drift",
@@ -51,7 +51,7 @@ const INSTRUMENT: [&str; 10] = [
     "low_pass_lag",
 ];
 
-fn number_of(id: &str) -> usize {
+fn effect_index(id: &str) -> usize {
     IDS.iter().position(|x| *x == id).unwrap_or(0)
 }
 
@@ -68,7 +68,7 @@ pub fn hide_effects(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, ta
         size: id.size,
     };
     if id.world == World::Rich {
-        enrich(rng, id, setup, target_n);
+        hide_rich_effects(rng, id, setup, target_n);
     }
     let count = match id.hide {
         Hide::One | Hide::Two | Hide::Three if id.world == World::Rich => 0,
@@ -83,29 +83,30 @@ pub fn hide_effects(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, ta
             let which = match (id.hide, k) {
                 // Every effect equally often; one that does not fit is replaced by the next.
                 (Hide::Instrument, _) => {
-                    let n = INSTRUMENT.len();
-                    number_of(INSTRUMENT[(in_turn(id, n) + turn as usize) % n])
+                    let n = INSTRUMENT_FAULTS.len();
+                    effect_index(INSTRUMENT_FAULTS[(item_index(id, n) + turn as usize) % n])
                 }
                 (Hide::Mixed, _) if id.world == World::Rich => {
-                    let n = INSTRUMENT.len() - 1;
-                    number_of(INSTRUMENT[1 + (in_turn(id, n) + turn as usize) % n])
+                    let n = INSTRUMENT_FAULTS.len() - 1;
+                    effect_index(INSTRUMENT_FAULTS[1 + (item_index(id, n) + turn as usize) % n])
                 }
-                (_, 0) => (in_turn(id, IDS.len()) + turn as usize) % IDS.len(),
+                (_, 0) => (item_index(id, IDS.len()) + turn as usize) % IDS.len(),
                 _ => rng.random_range(0..IDS.len()),
             };
             let e = draw_effect::draw_effect(rng, which, &case);
             // Among several effects a force gain could not be identified.
             let lone = matches!(id.hide, Hide::One | Hide::Instrument);
             let seen = lone || !matches!(e, Effect::ForceGain { .. });
-            (seen && fits(&e, setup) && setup.effects.iter().all(|o| apart(o, &e))).then_some(e)
+            (seen && can_hold(&e, setup) && setup.effects.iter().all(|o| are_distinguishable(o, &e)))
+                .then_some(e)
         });
         let Some(effect) = effect else { continue };
-        setup.effects.push(strengthened(setup, effect, each, largest));
+        setup.effects.push(scaled_to_target(setup, effect, each, largest));
     }
     if id.hide == Hide::Outside || (id.hide == Hide::Mixed && id.world == World::Plain) {
         let mut u = [0.0; 6];
         u.iter_mut().for_each(|x| *x = rng.random());
-        let kind = in_turn(id, UNMODELLED_SHAPES.len());
+        let kind = item_index(id, UNMODELLED_SHAPES.len());
         let mut shape = UnmodelledShape::new(kind, u, sd);
         for _ in 0..2 {
             let left = unexplained_rms_n(setup, &[], Some(&shape), RefitTerms::Common);
@@ -131,7 +132,7 @@ pub(super) fn hide_custom_effect(
     if custom.is_empty() {
         return;
     }
-    let mut effect = custom[in_turn(id, custom.len())].drawn(&mut || rng.random());
+    let mut effect = custom[item_index(id, custom.len())].with_random_parameters(&mut || rng.random());
     let mut left_n = 0.0;
     for _ in 0..=SCALING_STEPS {
         setup.custom = Some(Arc::clone(&effect));
@@ -146,7 +147,7 @@ pub(super) fn hide_custom_effect(
 }
 
 /// Draws the rich-law effects of a case and scales them to the target strength.
-fn enrich(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, target_n: f64) {
+fn hide_rich_effects(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, target_n: f64) {
     let count = match id.hide {
         Hide::One | Hide::Mixed => 1,
         Hide::Two => 2,
@@ -157,7 +158,7 @@ fn enrich(rng: &mut ChaCha8Rng, id: &CaseId, setup: &mut CaseSetup, target_n: f6
     let mut all = RichEffects::default();
     for k in 0..count {
         let turn = if k == 0 { 0 } else { rng.random_range(1..RICH_EFFECTS.len()) };
-        let which = (in_turn(id, RICH_EFFECTS.len()) + turn) % RICH_EFFECTS.len();
+        let which = (item_index(id, RICH_EFFECTS.len()) + turn) % RICH_EFFECTS.len();
         let mut one = RichEffects::default();
         rich_world_effects::add_rich_effect(rng, which, &truth, id.size, &mut one);
         for _ in 0..SCALING_STEPS {
@@ -192,10 +193,10 @@ pub fn hidden_name(name: &str) -> Option<&'static str> {
 pub fn intended_effect(id: &CaseId) -> Option<&'static str> {
     match id.hide {
         Hide::Clean | Hide::Custom => None,
-        Hide::Outside => Some(UNMODELLED_SHAPES[in_turn(id, UNMODELLED_SHAPES.len())]),
-        Hide::Instrument => Some(INSTRUMENT[in_turn(id, INSTRUMENT.len())]),
+        Hide::Outside => Some(UNMODELLED_SHAPES[item_index(id, UNMODELLED_SHAPES.len())]),
+        Hide::Instrument => Some(INSTRUMENT_FAULTS[item_index(id, INSTRUMENT_FAULTS.len())]),
         _ if id.world == World::Rich => None,
-        _ => Some(IDS[in_turn(id, IDS.len())]),
+        _ => Some(IDS[item_index(id, IDS.len())]),
     }
 }
 
@@ -203,7 +204,7 @@ pub fn intended_effect(id: &CaseId) -> Option<&'static str> {
 /// shuffled per round by the seed. Rows start at different positions of that order (a cyclic Latin square with shuffled rows), so that
 /// a few cases of all rows cover every item about equally often. The severity does not enter: the same insertion is examined at
 /// every severity.
-fn in_turn(id: &CaseId, n: usize) -> usize {
+fn item_index(id: &CaseId, n: usize) -> usize {
     let round = id.index / n as u64;
     let world = if id.world == World::Plain { 0 } else { 0x6a09_e667_f3bc_c909 };
     let order = shuffled(id.seed ^ world ^ round.wrapping_mul(0x9e37_79b9_7f4a_7c15), n);
@@ -223,7 +224,7 @@ fn shuffled(seed: u64, n: usize) -> Vec<usize> {
 }
 
 /// Scales an effect to the target strength, as closely as plausible parameters allow.
-fn strengthened(setup: &CaseSetup, effect: Effect, target_n: f64, largest_n: f64) -> Effect {
+fn scaled_to_target(setup: &CaseSetup, effect: Effect, target_n: f64, largest_n: f64) -> Effect {
     let mut effect = effect;
     for _ in 0..SCALING_STEPS {
         let left = unexplained_rms_n(setup, &[effect], None, RefitTerms::Nothing);
@@ -262,19 +263,19 @@ mod tests {
     fn counts(n: usize, cases: u64) -> Vec<usize> {
         let mut of = vec![0; n];
         for wrong in Wrong::ALL {
-            (0..cases).for_each(|k| of[in_turn(&id(*wrong, Hide::One, k), n)] += 1);
+            (0..cases).for_each(|k| of[item_index(&id(*wrong, Hide::One, k), n)] += 1);
         }
         of
     }
 
     #[test]
     fn in_every_row_each_thing_comes_once_a_round() {
-        for n in [IDS.len(), UNMODELLED_SHAPES.len(), RICH_EFFECTS.len(), INSTRUMENT.len()] {
+        for n in [IDS.len(), UNMODELLED_SHAPES.len(), RICH_EFFECTS.len(), INSTRUMENT_FAULTS.len()] {
             for wrong in Wrong::ALL {
                 for round in 0..2 {
                     let from = round * n as u64;
                     let mut drawn: Vec<usize> =
-                        (from..from + n as u64).map(|k| in_turn(&id(*wrong, Hide::One, k), n)).collect();
+                        (from..from + n as u64).map(|k| item_index(&id(*wrong, Hide::One, k), n)).collect();
                     drawn.sort_unstable();
                     assert_eq!(drawn, (0..n).collect::<Vec<_>>(), "{wrong}, round {round}");
                 }
@@ -299,7 +300,7 @@ mod tests {
     fn all_effects_and_all_outside_shapes_are_hidden_in_two_cases_of_every_row() {
         let first = |what: usize, n: usize| {
             let mut all = Wrong::ALL.iter().flat_map(|w| [(*w, 0), (*w, 1)]);
-            all.find(|(wrong, k)| in_turn(&id(*wrong, Hide::One, *k), n) == what)
+            all.find(|(wrong, k)| item_index(&id(*wrong, Hide::One, *k), n) == what)
         };
         (0..IDS.len() + UNMODELLED_SHAPES.len()).into_par_iter().for_each(|k| {
             let (hide, what, n) = match k.checked_sub(IDS.len()) {

@@ -17,8 +17,8 @@ const NEEDLE_M: f64 = 0.153;
 
 /// Library effects that describe an effect of the rich law, fixed before any run. `unknown` is correct for all of them.
 #[must_use]
-pub fn accepted_names(ingredient: &str) -> &'static [&'static str] {
-    match ingredient {
+pub fn accepted_names(effect: &str) -> &'static [&'static str] {
+    match effect {
         // Friction that builds up with travel, creeps, and in part does not depend on speed.
         "bristles" => &[
             "presliding_friction",
@@ -140,7 +140,7 @@ pub fn scaled(it: &RichEffects, factor: f64) -> Option<RichEffects> {
 /// Names of the effects present.
 #[must_use]
 pub fn names(it: &RichEffects) -> Vec<&'static str> {
-    let there = [
+    let present = [
         it.bristles.is_some(),
         it.foundation.is_some(),
         it.damage.is_some(),
@@ -148,7 +148,7 @@ pub fn names(it: &RichEffects) -> Vec<&'static str> {
         it.membrane.is_some(),
         it.bending.is_some(),
     ];
-    RICH_EFFECTS.iter().zip(there).filter_map(|(name, there)| there.then_some(*name)).collect()
+    RICH_EFFECTS.iter().zip(present).filter_map(|(name, present)| present.then_some(*name)).collect()
 }
 
 /// Union of two sets of effects; the second has priority.

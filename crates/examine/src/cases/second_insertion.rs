@@ -17,7 +17,7 @@ use rand::rngs::ChaCha8Rng;
 pub struct SecondInsertion {
     id: CaseId,
     setup: CaseSetup,
-    made: Vec<(MotionPath, NamedFile)>,
+    insertions: Vec<(MotionPath, NamedFile)>,
 }
 
 impl SecondInsertion {
@@ -26,7 +26,7 @@ impl SecondInsertion {
     pub fn new(id: &CaseId) -> Self {
         let mut setup = set_up_case(id, &[]);
         setup.paths.clear();
-        Self { id: *id, setup, made: Vec::new() }
+        Self { id: *id, setup, insertions: Vec::new() }
     }
 
     /// Start position of an insertion in m.
@@ -71,12 +71,12 @@ impl SecondInsertion {
     ///
     /// # Errors When the columns are not a valid recording.
     pub fn add_insertion(&mut self, path: MotionPath) -> Result<(), stylet_record::RecordError> {
-        let number = self.made.len() as u64;
+        let number = self.insertions.len() as u64;
         let mut rng = ChaCha8Rng::seed_from_u64(self.id.case_seed());
         rng.set_stream(100 + number);
         let (recording, _) = measure(&self.setup, &path, &mut rng)?;
         self.setup.paths.push(path.clone());
-        self.made.push((path, NamedFile { name: format!("{}.csv", number + 1), recording }));
+        self.insertions.push((path, NamedFile { name: format!("{}.csv", number + 1), recording }));
         Ok(())
     }
 
@@ -91,7 +91,7 @@ impl SecondInsertion {
                 self.setup.amounts.rate_hz,
             )),
             name,
-            recordings: self.made.iter().map(|m| m.1.clone()).collect(),
+            recordings: self.insertions.iter().map(|m| m.1.clone()).collect(),
         }
     }
 

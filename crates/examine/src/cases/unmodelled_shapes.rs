@@ -37,11 +37,11 @@ pub struct UnmodelledShape {
     pub u: [f64; 6],
     /// Size in N.
     pub size_n: f64,
-    memory: Memory,
+    memory: MotionHistory,
 }
 
 #[derive(Clone, Debug, Default)]
-struct Memory {
+struct MotionHistory {
     started: bool,
     t: f64,
     z: f64,
@@ -59,7 +59,7 @@ impl UnmodelledShape {
     /// A shape in its initial state.
     #[must_use]
     pub fn new(kind: usize, u: [f64; 6], size_n: f64) -> Self {
-        Self { kind: kind % UNMODELLED_SHAPES.len(), u, size_n, memory: Memory::default() }
+        Self { kind: kind % UNMODELLED_SHAPES.len(), u, size_n, memory: MotionHistory::default() }
     }
 
     /// Its name.
@@ -71,13 +71,13 @@ impl UnmodelledShape {
     /// The same shape at another size.
     #[must_use]
     pub fn scaled_to(&self, size_n: f64) -> Self {
-        Self { size_n, memory: Memory::default(), ..self.clone() }
+        Self { size_n, memory: MotionHistory::default(), ..self.clone() }
     }
 
-    fn remember(&mut self, p: &MotionState) {
+    fn update_history(&mut self, p: &MotionState) {
         let m = &mut self.memory;
         if !m.started {
-            *m = Memory { started: true, t: p.t, z: p.z, deepest: p.z, ..Memory::default() };
+            *m = MotionHistory { started: true, t: p.t, z: p.z, deepest: p.z, ..MotionHistory::default() };
         }
         let (dt, dz) = (p.t - m.t, p.z - m.z);
         m.t = p.t;
@@ -100,7 +100,7 @@ impl UnmodelledShape {
 
 impl UnmodelledForce for UnmodelledShape {
     fn force_n(&mut self, p: &MotionState, ruptures: &[f64]) -> f64 {
-        self.remember(p);
+        self.update_history(p);
         let m = &self.memory;
         let u = self.u;
         let MotionState { t, z, v, a } = *p;

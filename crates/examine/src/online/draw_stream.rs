@@ -1,7 +1,7 @@
 //! Tissue, motion, sensor and noise of a stream.
 
-use super::hand_held_motion::{Bumps, hand_held, stick_slip};
-use super::moving_tissue::Breath;
+use super::hand_held_motion::{DisturbanceForces, hand_held, stick_slip};
+use super::moving_tissue::TissueMotion;
 use super::stream_id::{Row, StreamId};
 use crate::cases::case_id::{Size, World};
 use crate::cases::draw_motion::{log_uniform, uniform};
@@ -45,9 +45,9 @@ pub struct StreamSetup {
     /// Travel in m over which a puncture releases its force.
     pub release_m: f64,
     /// Periodic motion of the tissue.
-    pub breath: Option<Breath>,
+    pub tissue_motion: Option<TissueMotion>,
     /// Disturbance forces on the needle's base.
-    pub bumps: Bumps,
+    pub disturbances: DisturbanceForces,
     /// Noise of the sensor.
     pub noise: SensorNoise,
     /// Samples per second.
@@ -69,8 +69,8 @@ pub fn set_up_stream(id: &StreamId) -> StreamSetup {
     let tissue = draw_tissue(&mut tissue_rng, id);
     let start_m = -uniform(&mut path_rng, AIR_M.0, AIR_M.1);
     let depth_m = tissue.end_m() + uniform(&mut path_rng, 2e-3, 6e-3);
-    let way = Way { start_m, depth_m, speed_mps: uniform(&mut path_rng, SPEED_MPS.0, SPEED_MPS.1) };
-    let path = draw_path(&mut path_rng, id, &way, &tissue);
+    let range = MotionRange { start_m, depth_m, speed_mps: uniform(&mut path_rng, SPEED_MPS.0, SPEED_MPS.1) };
+    let path = draw_path(&mut path_rng, id, &range, &tissue);
     let mut effects = Vec::new();
     let sign = if rng.random::<bool>() { 1.0 } else { -1.0 };
     match id.row {
@@ -87,15 +87,15 @@ pub fn set_up_stream(id: &StreamId) -> StreamSetup {
         Row::Lag => effects.push(Effect::LowPassLag { time_constant_s: of([5e-3, 15e-3, 40e-3]) }),
         _ => {}
     }
-    let breath = (id.row == Row::Breathing).then(|| Breath {
+    let tissue_motion = (id.row == Row::Breathing).then(|| TissueMotion {
         amplitude_m: of([0.5e-3, 1e-3, 2e-3]),
         frequency_hz: uniform(rng, 0.15, 0.3),
         phase_rad: uniform(rng, 0.0, TAU),
     });
-    let bumps = if id.row == Row::HandHeld {
-        Bumps::draw(rng, of([1.0, 3.0, 6.0]) as usize, of([0.05, 0.1, 0.2]), path.duration_s())
+    let disturbances = if id.row == Row::HandHeld {
+        DisturbanceForces::draw(rng, of([1.0, 3.0, 6.0]) as usize, of([0.05, 0.1, 0.2]), path.duration_s())
     } else {
-        Bumps::default()
+        DisturbanceForces::default()
     };
     let mut noise = SensorNoise::white(match id.row {
         Row::Constant | Row::Sinusoid | Row::Rate50Hz | Row::Rate1kHz | Row::Rate5kHz => {
@@ -118,8 +118,8 @@ pub fn set_up_stream(id: &StreamId) -> StreamSetup {
         rich,
         path,
         effects,
-        breath,
-        bumps,
+        tissue_motion,
+        disturbances,
         noise,
         rate_hz: match id.row {
             Row::Rate50Hz => 50.0,
@@ -194,29 +194,29 @@ fn draw_rich(rng: &mut ChaCha8Rng, id: &StreamId, tissue: &Tissue) -> Option<Ric
     }
 }
 
-struct Way {
+struct MotionRange {
     start_m: f64,
     depth_m: f64,
     speed_mps: f64,
 }
 
-impl Way {
+impl MotionRange {
     /// A move at constant speed from one position to another.
-    fn go(&self, from_m: f64, to_m: f64) -> MotionPiece {
+    fn constant_move(&self, from_m: f64, to_m: f64) -> MotionPiece {
         let speed_mps = if to_m < from_m { -1.5 * self.speed_mps } else { self.speed_mps };
         MotionPiece::constant(speed_mps, (to_m - from_m) / speed_mps)
     }
 }
 
-fn draw_path(rng: &mut ChaCha8Rng, id: &StreamId, way: &Way, tissue: &Tissue) -> MotionPath {
+fn draw_path(rng: &mut ChaCha8Rng, id: &StreamId, range: &MotionRange, tissue: &Tissue) -> MotionPath {
     let of = |three: [f64; 3]| three[id.severity as usize];
-    let length_m = way.depth_m - way.start_m;
+    let length_m = range.depth_m - range.start_m;
     let mut pieces = Vec::new();
     match id.row {
         Row::Sinusoid => {
-            let duration_s = length_m / way.speed_mps * 2.0;
+            let duration_s = length_m / range.speed_mps * 2.0;
             return MotionPath::new(
-                way.start_m,
+                range.start_m,
                 vec![MotionPiece::Swing {
                     amplitude_m: 0.5 * length_m,
                     frequency_hz: uniform(rng, 0.65, 0.9) / duration_s,
@@ -224,40 +224,43 @@ fn draw_path(rng: &mut ChaCha8Rng, id: &StreamId, way: &Way, tissue: &Tissue) ->
                 }],
             );
         }
-        Row::HandHeld => return hand_held(rng, way.start_m, way.depth_m, of([2e-5, 5e-5, 1e-4])),
-        Row::StickSlip => return stick_slip(rng, way.start_m, way.depth_m, of([2e-4, 5e-4, 1e-3])),
+        Row::HandHeld => return hand_held(rng, range.start_m, range.depth_m, of([2e-5, 5e-5, 1e-4])),
+        Row::StickSlip => return stick_slip(rng, range.start_m, range.depth_m, of([2e-4, 5e-4, 1e-3])),
         Row::Hold => {
             let mut places: Vec<f64> =
-                (0..of([1.0, 2.0, 4.0]) as usize).map(|_| uniform(rng, 0.0, way.depth_m)).collect();
+                (0..of([1.0, 2.0, 4.0]) as usize).map(|_| uniform(rng, 0.0, range.depth_m)).collect();
             places.sort_by(f64::total_cmp);
-            let mut from_m = way.start_m;
+            let mut from_m = range.start_m;
             for to_m in places {
-                pieces.extend([way.go(from_m, to_m), MotionPiece::constant(0.0, uniform(rng, 0.5, 3.0))]);
+                pieces.extend([
+                    range.constant_move(from_m, to_m),
+                    MotionPiece::constant(0.0, uniform(rng, 0.5, 3.0)),
+                ]);
                 from_m = to_m;
             }
-            pieces.push(way.go(from_m, way.depth_m));
+            pieces.push(range.constant_move(from_m, range.depth_m));
         }
         Row::Ripple => pieces.push(MotionPiece::Move {
-            speed_mps: way.speed_mps,
-            ripple_mps: way.speed_mps * of([0.2, 0.5, 0.9]),
+            speed_mps: range.speed_mps,
+            ripple_mps: range.speed_mps * of([0.2, 0.5, 0.9]),
             ripple_hz: uniform(rng, 0.3, 2.0),
-            duration_s: length_m / way.speed_mps,
+            duration_s: length_m / range.speed_mps,
         }),
         Row::Reinsertion => {
-            let mut from_m = way.start_m;
+            let mut from_m = range.start_m;
             for _ in 0..of([1.0, 2.0, 3.0]) as usize {
-                let to_m = uniform(rng, 0.4, 1.0) * way.depth_m;
+                let to_m = uniform(rng, 0.4, 1.0) * range.depth_m;
                 let back_m = uniform(rng, -2e-3, 0.5 * to_m);
                 let to_m = to_m.max(from_m);
                 pieces.extend([
-                    way.go(from_m, to_m),
+                    range.constant_move(from_m, to_m),
                     MotionPiece::constant(0.0, 0.5),
-                    way.go(to_m, back_m),
+                    range.constant_move(to_m, back_m),
                     MotionPiece::constant(0.0, 0.5),
                 ]);
                 from_m = back_m;
             }
-            pieces.push(way.go(from_m, way.depth_m));
+            pieces.push(range.constant_move(from_m, range.depth_m));
         }
         Row::DelayedPuncture => {
             let layer = rng.random_range(0..tissue.layers.len());
@@ -265,14 +268,17 @@ fn draw_path(rng: &mut ChaCha8Rng, id: &StreamId, way: &Way, tissue: &Tissue) ->
                 tissue.layers[layer].puncture_n.unwrap_or(0.0) / tissue.layers[layer].stiffness_n_per_m;
             let at_m = tissue.front_m(layer) + of([0.95, 0.9, 0.85]) * full_m;
             pieces.extend([
-                way.go(way.start_m, at_m),
+                range.constant_move(range.start_m, at_m),
                 MotionPiece::constant(0.0, 4.0),
-                way.go(at_m, way.depth_m),
+                range.constant_move(at_m, range.depth_m),
             ]);
         }
-        _ => pieces.push(way.go(way.start_m, way.depth_m)),
+        _ => pieces.push(range.constant_move(range.start_m, range.depth_m)),
     }
-    let back_m = uniform(rng, 0.3, 0.7) * way.depth_m;
-    pieces.extend([MotionPiece::constant(0.0, uniform(rng, 0.5, 1.5)), way.go(way.depth_m, back_m)]);
-    MotionPath::new(way.start_m, pieces)
+    let back_m = uniform(rng, 0.3, 0.7) * range.depth_m;
+    pieces.extend([
+        MotionPiece::constant(0.0, uniform(rng, 0.5, 1.5)),
+        range.constant_move(range.depth_m, back_m),
+    ]);
+    MotionPath::new(range.start_m, pieces)
 }

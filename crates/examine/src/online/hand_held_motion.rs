@@ -83,24 +83,24 @@ pub fn stick_slip(rng: &mut ChaCha8Rng, start_m: f64, depth_m: f64, jump_m: f64)
     MotionPath::new(start_m, pieces)
 }
 
-/// Short forces at the needle's base from contacts on the side: each rises and falls as one period of a raised cosine.
+/// Short forces at the needle's base from contacts from the side; each rises and falls as one period of a raised cosine.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Bumps(Vec<(f64, f64, f64)>);
+pub struct DisturbanceForces(Vec<(f64, f64, f64)>);
 
-impl Bumps {
-    /// `count` bumps of about `size_n` within `duration_s`.
+impl DisturbanceForces {
+    /// `count` short forces of about `size_n` in N within `duration_s`.
     #[must_use]
     pub fn draw(rng: &mut ChaCha8Rng, count: usize, size_n: f64, duration_s: f64) -> Self {
-        let bump = |_| {
+        let disturbance = |_| {
             let start_s = uniform(rng, 0.0, duration_s);
             let sign = if rng.random::<bool>() { 1.0 } else { -1.0 };
             (start_s, uniform(rng, 0.06, 0.3), sign * size_n * uniform(rng, 0.5, 1.5))
         };
-        Self((0..count).map(bump).collect())
+        Self((0..count).map(disturbance).collect())
     }
 }
 
-impl UnmodelledForce for Bumps {
+impl UnmodelledForce for DisturbanceForces {
     fn force_n(&mut self, at: &MotionState, _ruptures: &[f64]) -> f64 {
         let one = |&(start_s, length_s, size_n): &(f64, f64, f64)| {
             let x = (at.t - start_s) / length_s;

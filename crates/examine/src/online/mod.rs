@@ -6,7 +6,7 @@
 //! | [`stream_id`] | rows, severities and the name of a stream |
 //! | [`draw_stream`] | tissue, motion, sensor and noise of each row |
 //! | [`hand_held_motion`] | motion of a hand, of a sticking drive, and forces from the side |
-//! | [`moving_tissue`] | tissue that breathes under the needle |
+//! | [`moving_tissue`] | tissue that moves periodically under the needle |
 //! | [`simulate_stream`] | the samples and the truth |
 //! | [`measured_stream`] | recordings as streams |
 //! | [`stream_folder`] | export to a folder, and reading answers |

@@ -6,7 +6,7 @@ use core::f64::consts::TAU;
 
 /// A sinusoidal motion of the tissue along the needle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Breath {
+pub struct TissueMotion {
     /// Amplitude in m.
     pub amplitude_m: f64,
     /// Frequency in Hz.
@@ -20,14 +20,14 @@ pub struct MovingTissue<'a> {
     /// The law of the tissue at rest.
     pub law: &'a mut dyn ForceLaw,
     /// Its motion.
-    pub breath: Breath,
+    pub tissue_motion: TissueMotion,
 }
 
 impl MovingTissue<'_> {
     fn relative(&self, at: &MotionState) -> MotionState {
-        let w = TAU * self.breath.frequency_hz;
-        let (sin, cos) = libm::sincos(w * at.t + self.breath.phase_rad);
-        let a = self.breath.amplitude_m;
+        let w = TAU * self.tissue_motion.frequency_hz;
+        let (sin, cos) = libm::sincos(w * at.t + self.tissue_motion.phase_rad);
+        let a = self.tissue_motion.amplitude_m;
         MotionState { t: at.t, z: at.z - a * sin, v: at.v - a * w * cos, a: at.a + a * w * w * sin }
     }
 }

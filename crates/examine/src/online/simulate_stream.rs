@@ -90,7 +90,7 @@ pub fn simulate_stream(id: &StreamId) -> Stream {
         sensor = sensor.with_rounding(step_n);
     }
     let at_s = sample_times_s(&setup, &mut time_rng);
-    let mut bumps = setup.bumps.clone();
+    let mut disturbances = setup.disturbances.clone();
     let (mut plain, mut rich);
     let law: &mut dyn ForceLaw = match &setup.rich {
         None => {
@@ -104,42 +104,46 @@ pub fn simulate_stream(id: &StreamId) -> Stream {
     };
     let step_s = STEP_S.min(0.5 / setup.rate_hz);
     let mut moving;
-    let law: &mut dyn ForceLaw = match setup.breath {
+    let law: &mut dyn ForceLaw = match setup.tissue_motion {
         None => law,
-        Some(breath) => {
-            moving = MovingTissue { law, breath };
+        Some(tissue_motion) => {
+            moving = MovingTissue { law, tissue_motion };
             &mut moving
         }
     };
-    let there = simulate_insertion(law, &sensor, Some(&mut bumps), &setup.path, &at_s, step_s);
+    let insertion = simulate_insertion(law, &sensor, Some(&mut disturbances), &setup.path, &at_s, step_s);
     let mut noise = NoiseGenerator::new(&setup.noise, &mut noise_rng);
-    let force_n = there
+    let force_n = insertion
         .time_s
         .iter()
-        .zip(&there.force_n)
+        .zip(&insertion.force_n)
         .map(|(&t, &f)| sensor.reading_n(t, f, noise.next(t, f, 1.0 / setup.rate_hz)))
         .collect();
-    let last_s = there.time_s.last().copied().unwrap_or(0.0);
-    let punctures = there
+    let last_s = insertion.time_s.last().copied().unwrap_or(0.0);
+    let punctures = insertion
         .ruptures_s
         .iter()
-        .zip(&there.released_n)
+        .zip(&insertion.released_n)
         .filter(|(time_s, _)| **time_s <= last_s)
         .map(|(&time_s, &drop_n)| {
             let position_m = setup.path.position_m(time_s);
             let far = |(t, z): &(&f64, &f64)| **t >= time_s && **z >= position_m + setup.release_m;
-            let released_s =
-                there.time_s.iter().zip(&there.position_m).find(far).map_or(f64::INFINITY, |(t, _)| *t);
+            let released_s = insertion
+                .time_s
+                .iter()
+                .zip(&insertion.position_m)
+                .find(far)
+                .map_or(f64::INFINITY, |(t, _)| *t);
             TruePuncture { time_s, position_m, drop_n, released_s }
         })
         .collect();
     Stream {
         row: id.row.as_str(),
         rate_hz: setup.rate_hz,
-        position_m: there.position_m.iter().map(|z| libm::round(z / ENCODER_M) * ENCODER_M).collect(),
-        time_s: there.time_s,
+        position_m: insertion.position_m.iter().map(|z| libm::round(z / ENCODER_M) * ENCODER_M).collect(),
+        time_s: insertion.time_s,
         force_n,
-        tip_n: there.tip_n,
+        tip_n: insertion.tip_n,
         punctures,
         minor: Vec::new(),
         path: Some(setup.path),

@@ -99,7 +99,7 @@ fn content_error(path: &Path, why: impl Into<String>) -> ChallengeError {
 /// # Errors [`ChallengeError`]; partial output is removed.
 pub fn export_streams(export: &StreamExport, folder: &Path) -> Result<usize, ChallengeError> {
     if folder.exists() {
-        return Err(ChallengeError::There(folder.display().to_string()));
+        return Err(ChallengeError::FolderExists(folder.display().to_string()));
     }
     let mut part = folder.as_os_str().to_owned();
     part.push(".part");

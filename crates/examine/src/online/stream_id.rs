@@ -1,10 +1,10 @@
 //! Identifier of a stream: all its properties are functions of these words and numbers.
 
 use crate::cases::case_id::{Severity, World, mix};
-use crate::words::words;
+use crate::named_enum::named_enum;
 use serde::{Deserialize, Serialize};
 
-words! {
+named_enum! {
     /// Difficulty of the streams of a row.
     Row {
         Constant = "constant": "constant speed; white noise of 10, 25, 50 mN",
@@ -35,7 +35,7 @@ words! {
     }
 }
 
-words! {
+named_enum! {
     /// Streams for the development or for the test of a detector.
     Split {
         Make = "make": "for choosing settings; the truth is exported, too",

@@ -25,7 +25,8 @@ pub struct ScoredParameter {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub high: Option<f64>,
     /// Whether the 95 % interval contains the truth; `None` without an interval.
-    pub held: Option<bool>,
+    #[serde(rename = "held")]
+    pub interval_covers: Option<bool>,
     /// Label of the parameter in the answer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub label: Option<String>,
@@ -57,9 +58,11 @@ pub struct CaseOutcome {
     /// Confidence of each cause, and whether it is correct.
     pub confidence: Vec<(f64, bool)>,
     /// Score of the answer.
-    pub worth: AnswerScore,
+    #[serde(rename = "worth")]
+    pub score: AnswerScore,
     /// Estimated parameters with their true values.
-    pub numbers: Vec<ScoredParameter>,
+    #[serde(rename = "numbers")]
+    pub parameters: Vec<ScoredParameter>,
     /// Samples.
     pub samples: usize,
     /// Wall time of the answer in s.
@@ -78,9 +81,9 @@ impl CaseOutcome {
             Ok(answer) => (answer, None),
             Err(why) => (Answer { verdict: Verdict::Unknown, ..Answer::none() }, Some(why)),
         };
-        let mut worth = score_answer(&expected, &answer);
+        let mut score = score_answer(&expected, &answer);
         if failed.is_some() {
-            worth.correct = false;
+            score.correct = false;
         }
         let mut hidden: Vec<String> = case.setup.effects.iter().map(|e| e.id().to_owned()).collect();
         hidden.extend(case.setup.custom.as_ref().map(|c| c.id().to_owned()));
@@ -93,7 +96,7 @@ impl CaseOutcome {
         if let Some(custom) = &case.setup.custom {
             values.extend(custom.parameters().into_iter().map(|(p, x)| (format!("{}.{p}", custom.id()), x)));
         }
-        let there = |name: &str| {
+        let present = |name: &str| {
             expected.wanted.iter().any(|w| w.effect == name || w.also.iter().any(|a| a == name))
                 || expected.optional.iter().any(|o| o == name)
         };
@@ -118,10 +121,10 @@ impl CaseOutcome {
             confidence: answer
                 .causes
                 .iter()
-                .filter_map(|c| Some((c.confidence?, there(&c.effect))))
+                .filter_map(|c| Some((c.confidence?, present(&c.effect))))
                 .collect(),
-            numbers: numbers(case, &answer),
-            worth,
+            parameters: scored_parameters(case, &answer),
+            score,
             expected,
             samples: case.samples(),
             seconds,
@@ -131,20 +134,20 @@ impl CaseOutcome {
 }
 
 /// Parameters of two terms, the faster one first, because their order is arbitrary.
-fn in_order(numbers: &BTreeMap<String, Estimate>) -> BTreeMap<String, Estimate> {
-    let time = |term: &str| numbers.get(&format!("{term}.time_constant_s")).map(|e| e.value);
+fn in_order(estimates: &BTreeMap<String, Estimate>) -> BTreeMap<String, Estimate> {
+    let time = |term: &str| estimates.get(&format!("{term}.time_constant_s")).map(|e| e.value);
     let (first, second) = ("terms.0", "terms.1");
     if !matches!((time(first), time(second)), (Some(a), Some(b)) if a > b) {
-        return numbers.clone();
+        return estimates.clone();
     }
     let swapped = |path: &String| match path.strip_prefix(first) {
         Some(rest) => format!("{second}{rest}"),
         None => path.strip_prefix(second).map_or_else(|| path.clone(), |rest| format!("{first}{rest}")),
     };
-    numbers.iter().map(|(path, e)| (swapped(path), *e)).collect()
+    estimates.iter().map(|(path, e)| (swapped(path), *e)).collect()
 }
 
-fn numbers(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
+fn scored_parameters(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
     let mut out = Vec::new();
     if !rich_world_effects::names(&case.setup.rich).is_empty() {
         // A law of another form has no true values of the base law's parameters.
@@ -167,7 +170,7 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
             } else {
                 0.0
             };
-            let mut scored = number(
+            let mut scored = scored_parameter(
                 format!("{}.{path}", effect.id()),
                 truth,
                 e.value + turn,
@@ -183,7 +186,8 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
     {
         for (path, truth) in custom.parameters() {
             let Some(e) = cause.parameters.get(&path) else { continue };
-            let mut scored = number(format!("{}.{path}", custom.id()), truth, e.value, e.low, e.high);
+            let mut scored =
+                scored_parameter(format!("{}.{path}", custom.id()), truth, e.value, e.low, e.high);
             scored.label = answer.label(0, Some(custom.id()), &path);
             out.push(scored);
         }
@@ -206,7 +210,7 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
             _ => None,
         };
         if let Some(value) = value {
-            let mut scored = number(format!("base.{}", p.name), value, p.value, p.low, p.high);
+            let mut scored = scored_parameter(format!("base.{}", p.name), value, p.value, p.low, p.high);
             scored.label = answer.label(p.layer, None, &p.name);
             out.push(scored);
         }
@@ -214,9 +218,15 @@ fn numbers(case: &Case, answer: &Answer) -> Vec<ScoredParameter> {
     out
 }
 
-fn number(name: String, truth: f64, value: f64, low: Option<f64>, high: Option<f64>) -> ScoredParameter {
-    let held = low.zip(high).map(|(low, high)| low <= truth && truth <= high);
-    ScoredParameter { name, truth, value, low, high, held, label: None }
+fn scored_parameter(
+    name: String,
+    truth: f64,
+    value: f64,
+    low: Option<f64>,
+    high: Option<f64>,
+) -> ScoredParameter {
+    let interval_covers = low.zip(high).map(|(low, high)| low <= truth && truth <= high);
+    ScoredParameter { name, truth, value, low, high, interval_covers, label: None }
 }
 
 #[cfg(test)]

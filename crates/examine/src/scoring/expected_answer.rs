@@ -7,14 +7,14 @@
 //!    or missing samples are remarks on the data.
 //! 2. **A cause may be named or not** where a sensor's ordinary imperfection is a form of an effect: a force late by up to two samples
 //!    *is* a `time_delay`, mains hum *is* a `periodic_interference`, a 12-bit converter *is* a `quantisation`.
-//! 3. **`force_gain` cannot be seen** once K, b, F are re-fitted (all forces scale): naming it is a guess, and
+//! 3. **`force_gain` is not identifiable** once K, b, F are re-fitted (all forces scale): naming it is not justified, and
 //!    `none` is right. Its size is drawn within the tolerance.
-//! 4. **`position_scale` is the base law with other numbers**: recorded depths and speeds times `1 + eps` are thicknesses times
+//! 4. **`position_scale` is the base law with other parameter values**: recorded depths and speeds times `1 + eps` are thicknesses times
 //!    `1 + eps`, K over `1 + eps`, b over its square. Within the tolerances both the name and `none` are right.
 //! 5. **`boundary_shift` is two thicknesses**: within the tolerance of both layers the name and `none` are right, beyond the
 //!    tolerance of either only the name.
-//!    Where the thicknesses are a guess, so are both.
-//! 6. **A puncture that depends on speed cannot be seen in one recording**, in which every layer is punctured once: name or
+//!    Where the thicknesses are only guessed, both are right.
+//! 6. **A puncture that depends on speed is not identifiable from one recording**, in which every layer is punctured once: name or
 //!    `none`.
 //! 7. **Lags and delays below one sampling interval** cannot be distinguished: either name is accepted.
 //! 8. **Stribeck and presliding friction that dry friction imitates to less than 0.3 noise standard deviations** cannot be distinguished
@@ -173,8 +173,8 @@ fn expected_cause(effect: &Effect, setup: &CaseSetup) -> ExpectedCause {
 /// Whether an effect of the rich law may be left out: a foundation that yields by less than the thickness tolerance, or under layers
 /// that all rupture by force (equivalent to a softer layer); damage that affects the punctures of at most one recording; any effect
 /// with a residual below half a standard deviation of the noise.
-fn may_go_undetected(ingredient: &str, setup: &CaseSetup) -> bool {
-    match ingredient {
+fn may_go_undetected(effect: &str, setup: &CaseSetup) -> bool {
+    match effect {
         "foundation" => {
             let softness = setup.rich.foundation.map_or(0.0, |f| f.softness);
             softness / (1.0 + softness) <= THICKNESS_TOLERANCE + setup.amounts.thickness
@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_outside_the_library_is_unknown_and_what_cannot_be_seen_is_not_named() {
+    fn effects_outside_the_library_are_unknown_and_unidentifiable_ones_are_not_named() {
         let outside = Expected { outside: true, unknown_is_right: true, ..Expected::default() };
         assert!(score_answer(&outside, &says(Verdict::Unknown, &[])).correct);
         assert!(!score_answer(&outside, &says(Verdict::None, &[])).correct);

@@ -62,9 +62,9 @@ pub fn table_cells(outcomes: &[CaseOutcome]) -> Vec<TableCell> {
             let seconds: Vec<f64> = all.iter().map(|o| o.seconds).collect();
             TableCell {
                 id,
-                right: SuccessRate::of(&all, |o| o.worth.correct),
-                all_found: SuccessRate::of(&all, |o| o.worth.all_found),
-                wrong_name: SuccessRate::of(&all, |o| o.worth.wrong_name),
+                right: SuccessRate::of(&all, |o| o.score.correct),
+                all_found: SuccessRate::of(&all, |o| o.score.all_found),
+                wrong_name: SuccessRate::of(&all, |o| o.score.wrong_name),
                 unknown: SuccessRate::of(&all, |o| o.verdict == Verdict::Unknown && o.failed.is_none()),
                 median_s: quantile_of(seconds.iter().copied(), 0.5),
                 p90_s: quantile_of(seconds.iter().copied(), 0.9),
@@ -106,12 +106,12 @@ pub fn results_text(outcomes: &[CaseOutcome]) -> String {
             c.p90_s
         );
     }
-    together(&mut out, outcomes);
-    said(&mut out, outcomes);
-    held(&mut out, outcomes);
-    labelled(&mut out, outcomes);
-    graded(&mut out, outcomes);
-    confident(&mut out, outcomes);
+    write_by_hidden_cause(&mut out, outcomes);
+    write_wrong_answers(&mut out, outcomes);
+    write_interval_coverage(&mut out, outcomes);
+    write_coverage_by_label(&mut out, outcomes);
+    write_by_grade(&mut out, outcomes);
+    write_by_confidence(&mut out, outcomes);
     let failed: Vec<&CaseOutcome> = outcomes.iter().filter(|o| o.failed.is_some()).collect();
     if let Some(first) = failed.first() {
         let why = first.failed.as_deref().unwrap_or("");
@@ -122,26 +122,26 @@ pub fn results_text(outcomes: &[CaseOutcome]) -> String {
 }
 
 /// Results by hidden cause over all rows.
-fn together(out: &mut String, outcomes: &[CaseOutcome]) {
+fn write_by_hidden_cause(out: &mut String, outcomes: &[CaseOutcome]) {
     let mut by: BTreeMap<_, Vec<&CaseOutcome>> = BTreeMap::new();
     for o in outcomes {
         by.entry((o.id.world, o.id.hide, o.id.size)).or_default().push(o);
     }
-    let _ = writeln!(out, "\nall rows together: correct and alone; false attribution");
+    let _ = writeln!(out, "\nall rows: exactly correct; false attribution");
     for ((world, hide, size), all) in by {
-        let right = SuccessRate::of(&all, |o| o.worth.correct);
-        let wrong = SuccessRate::of(&all, |o| o.worth.wrong_name);
+        let right = SuccessRate::of(&all, |o| o.score.correct);
+        let wrong = SuccessRate::of(&all, |o| o.score.wrong_name);
         let _ = writeln!(out, "    {:<48}{right:<28}{wrong}", format!("{world}: {hide}, {size}"));
     }
 }
 
 /// Wrong answers by hidden cause.
-fn said(out: &mut String, outcomes: &[CaseOutcome]) {
+fn write_wrong_answers(out: &mut String, outcomes: &[CaseOutcome]) {
     let mut by: BTreeMap<(String, String), usize> = BTreeMap::new();
-    for o in outcomes.iter().filter(|o| !o.worth.correct) {
+    for o in outcomes.iter().filter(|o| !o.score.correct) {
         let hidden = if o.hidden.is_empty() { "(clean)".to_owned() } else { o.hidden.join(" + ") };
         let causes: Vec<String> = o.named.iter().map(|c| c.join("|")).collect();
-        let said = match o.verdict {
+        let answered = match o.verdict {
             _ if o.failed.is_some() => "no answer".to_owned(),
             Verdict::None => "none".to_owned(),
             Verdict::Parameters if causes.is_empty() => "parameters".to_owned(),
@@ -149,22 +149,22 @@ fn said(out: &mut String, outcomes: &[CaseOutcome]) {
             Verdict::Unknown => format!("unknown, with {}", causes.join(" + ")),
             _ => causes.join(" + "),
         };
-        *by.entry((hidden, said)).or_default() += 1;
+        *by.entry((hidden, answered)).or_default() += 1;
     }
     if !by.is_empty() {
-        let _ = writeln!(out, "\nnot right: hidden -> said (cases)");
+        let _ = writeln!(out, "\nwrong answers: hidden -> answer (cases)");
     }
-    for ((hidden, said), n) in by {
-        let _ = writeln!(out, "    {hidden} -> {said}  {n}");
+    for ((hidden, answered), n) in by {
+        let _ = writeln!(out, "    {hidden} -> {answered}  {n}");
     }
 }
 
 /// Coverage of the 95 % intervals.
-fn held(out: &mut String, outcomes: &[CaseOutcome]) {
+fn write_interval_coverage(out: &mut String, outcomes: &[CaseOutcome]) {
     let mut by: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
-    for n in outcomes.iter().flat_map(|o| &o.numbers) {
-        if let Some(held) = n.held {
-            by.entry(&n.name).or_default().push(held);
+    for n in outcomes.iter().flat_map(|o| &o.parameters) {
+        if let Some(covers) = n.interval_covers {
+            by.entry(&n.name).or_default().push(covers);
         }
     }
     let all = |base: bool| {
@@ -178,24 +178,26 @@ fn held(out: &mut String, outcomes: &[CaseOutcome]) {
     }
     let _ = writeln!(
         out,
-        "\n95 % intervals hold the truth: causes' numbers {}, base numbers {}",
+        "\n95 % intervals that contain the truth: effect parameters {}, base parameters {}",
         all(false),
         all(true)
     );
-    for (name, held) in &by {
-        let rate = SuccessRate::of(held, |h| **h);
+    for (name, covers) in &by {
+        let rate = SuccessRate::of(covers, |h| **h);
         let _ = writeln!(out, "    {name:<52}{rate}");
     }
 }
 
 /// Coverage of the 95 % intervals, and share of those within 10 % of the value, by the label of the parameter.
-fn labelled(out: &mut String, outcomes: &[CaseOutcome]) {
+fn write_coverage_by_label(out: &mut String, outcomes: &[CaseOutcome]) {
     /// Half width of a narrow interval, relative to the value.
     const NARROW: f64 = 0.1;
     let mut by: BTreeMap<&str, Vec<(bool, bool)>> = BTreeMap::new();
-    for n in outcomes.iter().flat_map(|o| &o.numbers) {
-        if let (Some(label), Some(held), Some((low, high))) = (&n.label, n.held, n.low.zip(n.high)) {
-            by.entry(label).or_default().push((held, high - low <= 2.0 * NARROW * n.value.abs()));
+    for n in outcomes.iter().flat_map(|o| &o.parameters) {
+        if let (Some(label), Some(covers), Some((low, high))) =
+            (&n.label, n.interval_covers, n.low.zip(n.high))
+        {
+            by.entry(label).or_default().push((covers, high - low <= 2.0 * NARROW * n.value.abs()));
         }
     }
     if !by.is_empty() {
@@ -205,22 +207,22 @@ fn labelled(out: &mut String, outcomes: &[CaseOutcome]) {
         );
     }
     for (label, all) in &by {
-        let [held, close] =
-            [SuccessRate::of(all, |(held, _)| *held), SuccessRate::of(all, |(_, close)| *close)];
-        let _ = writeln!(out, "    {label:<24}{held:<28}{close}");
+        let [covers, close] =
+            [SuccessRate::of(all, |(covers, _)| *covers), SuccessRate::of(all, |(_, close)| *close)];
+        let _ = writeln!(out, "    {label:<24}{covers:<28}{close}");
     }
 }
 
 /// How often the answer is right, by the grade of its model.
-fn graded(out: &mut String, outcomes: &[CaseOutcome]) {
+fn write_by_grade(out: &mut String, outcomes: &[CaseOutcome]) {
     let mut by: BTreeMap<&str, Vec<bool>> = BTreeMap::new();
     for o in outcomes {
         if let Some(grade) = &o.grade {
-            by.entry(grade).or_default().push(o.worth.correct);
+            by.entry(grade).or_default().push(o.score.correct);
         }
     }
     if !by.is_empty() {
-        let _ = writeln!(out, "\nby the grade of the model: right");
+        let _ = writeln!(out, "\nby the grade of the model: correct");
     }
     for (grade, right) in &by {
         let _ = writeln!(out, "    {grade}  {}", SuccessRate::of(right, |right| **right));
@@ -228,19 +230,20 @@ fn graded(out: &mut String, outcomes: &[CaseOutcome]) {
 }
 
 /// Share of correct causes by their confidence, and the Brier score.
-fn confident(out: &mut String, outcomes: &[CaseOutcome]) {
+fn write_by_confidence(out: &mut String, outcomes: &[CaseOutcome]) {
     let all: Vec<(f64, bool)> = outcomes.iter().flat_map(|o| o.confidence.iter().copied()).collect();
     if all.is_empty() {
         return;
     }
-    let brier = all.iter().map(|(p, there)| (p - f64::from(*there)).powi(2)).sum::<f64>() / all.len() as f64;
+    let brier =
+        all.iter().map(|(p, present)| (p - f64::from(*present)).powi(2)).sum::<f64>() / all.len() as f64;
     let _ = writeln!(out, "\nconfidence of {} causes, Brier score {brier:.4}", all.len());
     for k in 0..10 {
         let (low, high) = (0.1 * f64::from(k), 0.1 * f64::from(k + 1));
         let bin = all.iter().filter(|(p, _)| *p >= low && (*p < high || (k == 9 && *p <= 1.0)));
-        let rate = SuccessRate::of(bin, |(_, there)| *there);
+        let rate = SuccessRate::of(bin, |(_, present)| *present);
         if rate.of > 0 {
-            let _ = writeln!(out, "    said {low:.1} to {high:.1}: there in {rate}");
+            let _ = writeln!(out, "    stated {low:.1} to {high:.1}: correct in {rate}");
         }
     }
 }

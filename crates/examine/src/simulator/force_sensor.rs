@@ -118,7 +118,7 @@ pub struct SensorState {
 
 impl SensorState {
     /// Adds a knot.
-    pub fn feed(&mut self, knot: ForceKnot) {
+    pub fn add_knot(&mut self, knot: ForceKnot) {
         let f = self.gain * knot.force_n;
         if !self.started {
             // The force before the first knot is assumed to be constant.

@@ -50,7 +50,7 @@ pub fn simulate_insertion(
         |p: &MotionState, ruptures: &[f64]| strange.as_mut().map_or(0.0, |s| s.force_n(p, ruptures));
     let first = law.start(&here);
     let first = first + extra(&here, law.ruptures()) + instrument.tool_n(here.z, here.v, here.a);
-    line.feed(ForceKnot { t: here.t, force_n: first });
+    line.add_knot(ForceKnot { t: here.t, force_n: first });
     for &t in at_s {
         while here.t < t {
             let border = path.piece_end_s(piece);
@@ -73,7 +73,7 @@ pub fn simulate_insertion(
                         a: here.a + (next.a - here.a) * s,
                     };
                     let force_n = knot.force_n + extra(&p, law.ruptures()) + instrument.tool_n(p.z, p.v, p.a);
-                    line.feed(ForceKnot { t: knot.t, force_n });
+                    line.add_knot(ForceKnot { t: knot.t, force_n });
                 }
                 here = next;
             }
@@ -86,7 +86,7 @@ pub fn simulate_insertion(
                     let force_n = knot.force_n
                         + extra(&here, law.ruptures())
                         + instrument.tool_n(here.z, here.v, here.a);
-                    line.feed(ForceKnot { t: knot.t, force_n });
+                    line.add_knot(ForceKnot { t: knot.t, force_n });
                 }
             }
         }

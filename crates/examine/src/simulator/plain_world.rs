@@ -37,9 +37,9 @@ struct Slab {
     puncture: f64,
 }
 
-/// Active effects of the tissue, by their place in the law.
+/// Parameters of the active effects of the tissue.
 #[derive(Default)]
-struct Departures {
+struct ActiveEffects {
     kappa: f64,
     prony: [(f64, f64); 2],
     relaxes: bool,
@@ -53,7 +53,7 @@ struct Departures {
     alpha: f64,
     membrane: Option<(f64, f64, f64)>,
     width: f64,
-    breath: Option<(f64, f64, f64)>,
+    respiration: Option<(f64, f64, f64)>,
     spring: Option<f64>,
     /// Share of the elastic force lost on unloading, and the change of force over which the branches switch.
     hysteresis: Option<(f64, f64)>,
@@ -61,7 +61,7 @@ struct Departures {
 
 /// State of the law.
 #[derive(Clone, Copy, Default)]
-struct Memory {
+struct LawState {
     t: f64,
     /// Tip position and velocity relative to the tissue.
     z: f64,
@@ -91,8 +91,8 @@ struct Memory {
 /// The plain law with its state.
 pub struct PlainWorld {
     slabs: Vec<Slab>,
-    with: Departures,
-    now: Memory,
+    effects: ActiveEffects,
+    state: LawState,
     ruptures: Vec<f64>,
     released: Vec<f64>,
     /// Releases in progress: force and position.
@@ -117,46 +117,47 @@ impl PlainWorld {
                 puncture: l.puncture_n.unwrap_or(f64::INFINITY),
             })
             .collect();
-        let mut with = Departures { exponent: 1.0, ..Departures::default() };
+        let mut active = ActiveEffects { exponent: 1.0, ..ActiveEffects::default() };
         for effect in effects {
             match *effect {
-                Effect::NonlinearElasticity { kappa_per_m } => with.kappa += kappa_per_m,
+                Effect::NonlinearElasticity { kappa_per_m } => active.kappa += kappa_per_m,
                 Effect::StressRelaxation { terms } => {
-                    with.prony = terms;
-                    with.relaxes = terms.iter().any(|t| t.0 != 0.0);
+                    active.prony = terms;
+                    active.relaxes = terms.iter().any(|t| t.0 != 0.0);
                 }
-                Effect::CoulombFriction { c_n_per_m } => with.coulomb += c_n_per_m,
+                Effect::CoulombFriction { c_n_per_m } => active.coulomb += c_n_per_m,
                 Effect::StribeckFriction { c_n_per_m, c_static_n_per_m, v_stribeck_mps } => {
-                    with.stribeck = Some((c_n_per_m, c_static_n_per_m, v_stribeck_mps));
+                    active.stribeck = Some((c_n_per_m, c_static_n_per_m, v_stribeck_mps));
                 }
-                Effect::PreslidingFriction { c_n_per_m, delta_m } => with.dahl = Some((c_n_per_m, delta_m)),
-                Effect::AsymmetricFriction { eps } => with.asymmetry = eps,
-                Effect::PowerLawFriction { exponent } => with.exponent = exponent,
-                Effect::CuttingForce { force_n } => with.cutting = force_n,
-                Effect::IncompleteRelease { fraction } => with.kept = fraction,
-                Effect::RateDependentPuncture { alpha } => with.alpha = alpha,
+                Effect::PreslidingFriction { c_n_per_m, delta_m } => active.dahl = Some((c_n_per_m, delta_m)),
+                Effect::AsymmetricFriction { eps } => active.asymmetry = eps,
+                Effect::PowerLawFriction { exponent } => active.exponent = exponent,
+                Effect::CuttingForce { force_n } => active.cutting = force_n,
+                Effect::IncompleteRelease { fraction } => active.kept = fraction,
+                Effect::RateDependentPuncture { alpha } => active.alpha = alpha,
                 Effect::HiddenMembrane { depth_m, stiffness_n_per_m, puncture_n } => {
-                    with.membrane = Some((tissue.surface_m + depth_m, stiffness_n_per_m, puncture_n));
+                    active.membrane = Some((tissue.surface_m + depth_m, stiffness_n_per_m, puncture_n));
                 }
                 Effect::BoundaryShift { layer, shift_m } if layer >= 1 && layer < slabs.len() => {
                     slabs[layer - 1].far += shift_m;
                     slabs[layer].front += shift_m;
                 }
-                Effect::SoftBoundary { width_m } => with.width = width_m,
+                Effect::SoftBoundary { width_m } => active.width = width_m,
                 Effect::Respiration { amplitude_m, frequency_hz, phase_rad } => {
-                    with.breath = Some((amplitude_m, core::f64::consts::TAU * frequency_hz, phase_rad));
+                    active.respiration =
+                        Some((amplitude_m, core::f64::consts::TAU * frequency_hz, phase_rad));
                 }
                 Effect::LoadingHysteresis { fraction, reversal_n } => {
-                    with.hysteresis = Some((fraction, reversal_n));
+                    active.hysteresis = Some((fraction, reversal_n));
                 }
-                Effect::NeedleCompliance { stiffness_n_per_m } => with.spring = Some(stiffness_n_per_m),
+                Effect::NeedleCompliance { stiffness_n_per_m } => active.spring = Some(stiffness_n_per_m),
                 _ => {}
             }
         }
         Self {
             slabs,
-            with,
-            now: Memory::default(),
+            effects: active,
+            state: LawState::default(),
             ruptures: Vec::new(),
             released: Vec::new(),
             soft: Vec::new(),
@@ -166,7 +167,7 @@ impl PlainWorld {
 
     /// Depth and speed of the base relative to the tissue.
     fn relative(&self, p: &MotionState) -> (f64, f64) {
-        match self.with.breath {
+        match self.effects.respiration {
             None => (p.z, p.v),
             Some((amplitude, w, phase)) => {
                 let (sin, cos) = libm::sincos(w * p.t + phase);
@@ -178,7 +179,7 @@ impl PlainWorld {
     fn elastic(&self, z: f64) -> f64 {
         let Some(slab) = self.slabs.get(self.ruptures.len()) else { return 0.0 };
         let x = (z - slab.front).max(0.0);
-        slab.stiffness * x * (1.0 + self.with.kappa * x)
+        slab.stiffness * x * (1.0 + self.effects.kappa * x)
     }
 
     /// Friction coefficient and length of needle inside.
@@ -196,24 +197,26 @@ impl PlainWorld {
     }
 
     /// The state after `dt` with the tip at `z`, moving at `v`, without a rupture.
-    fn taken_to(&mut self, dt: f64, z: f64, v: f64) -> Memory {
-        let from = self.now;
-        let mut to = Memory { t: from.t + dt, z, v, deepest: from.deepest.max(z), ..from };
+    fn state_after(&mut self, dt: f64, z: f64, v: f64) -> LawState {
+        let from = self.state;
+        let mut to = LawState { t: from.t + dt, z, v, deepest: from.deepest.max(z), ..from };
         to.elastic = self.elastic(z);
         to.loading_n = to.elastic;
-        if let Some((fraction, reversal)) = self.with.hysteresis {
+        if let Some((fraction, reversal)) = self.effects.hysteresis {
             let change = to.loading_n - from.loading_n;
             let keep = libm::exp(-change.abs() / reversal);
             to.unloaded = from.unloaded * keep + if change < 0.0 { 2.0 * (1.0 - keep) } else { 0.0 };
             to.elastic *= 1.0 - 0.5 * fraction * to.unloaded;
         }
         to.active_n = to.elastic;
-        if self.with.relaxes {
+        if self.effects.relaxes {
             if (dt - self.decay.0).abs() > 1e-9 * dt {
-                self.decay =
-                    (dt, self.with.prony.map(|(_, tau)| if tau > 0.0 { libm::exp(-dt / tau) } else { 0.0 }));
+                self.decay = (
+                    dt,
+                    self.effects.prony.map(|(_, tau)| if tau > 0.0 { libm::exp(-dt / tau) } else { 0.0 }),
+                );
             }
-            for (k, &(g, tau)) in self.with.prony.iter().enumerate() {
+            for (k, &(g, tau)) in self.effects.prony.iter().enumerate() {
                 if g == 0.0 || dt <= 0.0 {
                     to.active_n -= to.relaxed[k];
                     continue;
@@ -227,7 +230,7 @@ impl PlainWorld {
             }
         }
         let (viscous, inside) = self.shaft(z);
-        if let Some((_, delta)) = self.with.dahl
+        if let Some((_, delta)) = self.effects.dahl
             && inside > 0.0
         {
             let (s, travel) = (sgn(v), z - from.z);
@@ -244,72 +247,74 @@ impl PlainWorld {
         to
     }
 
-    fn total(&self, m: &Memory, viscous: f64, inside: f64) -> f64 {
-        let with = &self.with;
+    fn total(&self, m: &LawState, viscous: f64, inside: f64) -> f64 {
+        let effects = &self.effects;
         let s = sgn(m.v);
         let mut slip = m.v;
-        if with.exponent != 1.0 {
-            slip = if s == 0.0 { 0.0 } else { s * V0_MPS * libm::pow(m.v.abs() / V0_MPS, with.exponent) };
+        if effects.exponent != 1.0 {
+            slip = if s == 0.0 { 0.0 } else { s * V0_MPS * libm::pow(m.v.abs() / V0_MPS, effects.exponent) };
         }
-        let mut force = m.active_n + slip * viscous * (1.0 + with.asymmetry * s);
+        let mut force = m.active_n + slip * viscous * (1.0 + effects.asymmetry * s);
         if inside > 0.0 {
-            let mut dry = with.coulomb * s;
-            if let Some((c, rest, v_s)) = with.stribeck
+            let mut dry = effects.coulomb * s;
+            if let Some((c, rest, v_s)) = effects.stribeck
                 && s != 0.0
             {
                 let x = m.v / v_s;
                 dry += s * (c + (rest - c) * libm::exp(-x * x));
             }
-            if let Some((c, _)) = with.dahl {
+            if let Some((c, _)) = effects.dahl {
                 dry += c * m.bristle;
             }
             force += dry * inside;
         }
-        if with.cutting != 0.0 && s > 0.0 && self.cuts(m.z) {
-            force += with.cutting;
+        if effects.cutting != 0.0 && s > 0.0 && self.is_cutting(m.z) {
+            force += effects.cutting;
         }
-        if let Some((depth, stiffness, _)) = with.membrane
+        if let Some((depth, stiffness, _)) = effects.membrane
             && !m.membrane_gone
         {
             force += stiffness * (m.z - depth).max(0.0);
         }
         force += m.kept;
         for (released, at) in &self.soft {
-            force += released * (1.0 - (m.deepest - at) / with.width).max(0.0);
+            force += released * (1.0 - (m.deepest - at) / effects.width).max(0.0);
         }
         force
     }
 
     /// Whether the tip is inside a layer that was punctured or needs no puncture.
-    fn cuts(&self, z: f64) -> bool {
+    fn is_cutting(&self, z: f64) -> bool {
         let at = self.slabs.iter().position(|s| z >= s.front && z < s.far);
         at.is_some_and(|i| i < self.ruptures.len() || self.slabs[i].puncture == f64::INFINITY)
     }
 
     fn threshold(&self, puncture: f64, v: f64) -> f64 {
-        if self.with.alpha == 0.0 || puncture == f64::INFINITY {
+        if self.effects.alpha == 0.0 || puncture == f64::INFINITY {
             return puncture;
         }
         let speed = v.abs().max(0.1 * V0_MPS);
-        puncture * (1.0 + self.with.alpha * libm::log(speed / V0_MPS)).max(0.1)
+        puncture * (1.0 + self.effects.alpha * libm::log(speed / V0_MPS)).max(0.1)
     }
 
-    fn layer_gives_way(&self, m: &Memory) -> bool {
+    fn layer_gives_way(&self, m: &LawState) -> bool {
         self.slabs
             .get(self.ruptures.len())
             .is_some_and(|s| m.z >= s.far || m.active_n >= self.threshold(s.puncture, m.v))
     }
 
-    fn membrane_gives_way(&self, m: &Memory) -> bool {
-        self.with.membrane.is_some_and(|(depth, k, f)| !m.membrane_gone && k > 0.0 && k * (m.z - depth) >= f)
+    fn membrane_gives_way(&self, m: &LawState) -> bool {
+        self.effects
+            .membrane
+            .is_some_and(|(depth, k, f)| !m.membrane_gone && k > 0.0 && k * (m.z - depth) >= f)
     }
 
     /// The state after a share `s` of the step of the base.
-    fn part(&mut self, s: f64, dt: f64, base: f64, base_v: f64) -> Memory {
-        let from = self.now;
+    fn state_at_share(&mut self, s: f64, dt: f64, base: f64, base_v: f64) -> LawState {
+        let from = self.state;
         let (z, v) = (from.base + (base - from.base) * s, from.base_v + (base_v - from.base_v) * s);
-        let mut to = match self.with.spring {
-            None => self.taken_to(dt * s, z, v),
+        let mut to = match self.effects.spring {
+            None => self.state_after(dt * s, z, v),
             Some(spring) => self.balanced(dt * s, z, spring),
         };
         to.base = z;
@@ -319,8 +324,8 @@ impl PlainWorld {
 
     /// Tip position of a compliant needle, where the law's force equals that of the spring. The tip's speed is the slope of
     /// its position by the second-order backward formula, after a jump by the first-order one.
-    fn balanced(&mut self, dt: f64, base: f64, spring: f64) -> Memory {
-        let from = self.now;
+    fn balanced(&mut self, dt: f64, base: f64, spring: f64) -> LawState {
+        let from = self.state;
         let dt = dt.max(1e-12);
         let (lead, rest) = match from.before {
             Some((z, h)) => {
@@ -334,9 +339,9 @@ impl PlainWorld {
         let guess = (from.z + from.v * dt).clamp(from.z - 1e-3, from.z + 1e-3);
         let (viscous, inside) = self.shaft(guess);
         let slab = self.slabs.get(self.ruptures.len()).map_or(0.0, |s| s.stiffness);
-        let slope = spring + slab + (viscous + self.with.coulomb * inside * 1e-3) * lead / dt;
+        let slope = spring + slab + (viscous + self.effects.coulomb * inside * 1e-3) * lead / dt;
         let eval = |this: &mut Self, z: f64| {
-            let m = this.taken_to(dt, z, speed(z));
+            let m = this.state_after(dt, z, speed(z));
             let off = m.total - spring * (base - z);
             (m, off)
         };
@@ -372,37 +377,37 @@ impl PlainWorld {
         m
     }
 
-    fn gives_way(&self, m: &Memory) -> bool {
+    fn gives_way(&self, m: &LawState) -> bool {
         self.layer_gives_way(m) || self.membrane_gives_way(m)
     }
 
     /// Ruptures what has reached its limit in the present state.
     fn rupture(&mut self) {
-        let m = self.now;
+        let m = self.state;
         if self.membrane_gives_way(&m) {
-            self.now.membrane_gone = true;
+            self.state.membrane_gone = true;
         }
         if self.layer_gives_way(&m) {
-            let kept = self.with.kept * m.active_n;
-            if self.with.kept != 0.0 {
-                self.now.kept = kept;
+            let kept = self.effects.kept * m.active_n;
+            if self.effects.kept != 0.0 {
+                self.state.kept = kept;
             }
-            if self.with.width > 0.0 {
-                self.soft.retain(|(_, at)| m.deepest - at < self.with.width);
+            if self.effects.width > 0.0 {
+                self.soft.retain(|(_, at)| m.deepest - at < self.effects.width);
                 self.soft.push((m.active_n - kept, m.z));
-                self.now.deepest = m.z;
+                self.state.deepest = m.z;
             }
             self.ruptures.push(m.t);
-            self.now.relaxed = [0.0; 2];
-            self.now.elastic = self.elastic(m.z);
-            (self.now.unloaded, self.now.loading_n) = (0.0, self.now.elastic);
-            self.now.active_n = self.now.elastic;
-            self.released.push(m.active_n - kept - self.now.active_n);
+            self.state.relaxed = [0.0; 2];
+            self.state.elastic = self.elastic(m.z);
+            (self.state.unloaded, self.state.loading_n) = (0.0, self.state.elastic);
+            self.state.active_n = self.state.elastic;
+            self.released.push(m.active_n - kept - self.state.active_n);
         }
-        self.now.before = None;
-        if self.with.spring.is_none() {
+        self.state.before = None;
+        if self.effects.spring.is_none() {
             let (viscous, inside) = self.shaft(m.z);
-            self.now.total = self.total(&self.now, viscous, inside);
+            self.state.total = self.total(&self.state, viscous, inside);
         }
     }
 }
@@ -410,59 +415,59 @@ impl PlainWorld {
 impl ForceLaw for PlainWorld {
     fn start(&mut self, at: &MotionState) -> f64 {
         let (z, v) = self.relative(at);
-        self.now = Memory { t: at.t, z, v, base: z, base_v: v, deepest: z, ..Memory::default() };
-        self.now.elastic = self.elastic(z);
-        self.now.loading_n = self.now.elastic;
-        self.now.active_n = self.now.elastic;
-        while self.gives_way(&self.now) {
+        self.state = LawState { t: at.t, z, v, base: z, base_v: v, deepest: z, ..LawState::default() };
+        self.state.elastic = self.elastic(z);
+        self.state.loading_n = self.state.elastic;
+        self.state.active_n = self.state.elastic;
+        while self.gives_way(&self.state) {
             self.rupture();
         }
         let (viscous, inside) = self.shaft(z);
-        self.now.total =
-            if self.with.spring.is_some() { 0.0 } else { self.total(&self.now, viscous, inside) };
-        self.now.total
+        self.state.total =
+            if self.effects.spring.is_some() { 0.0 } else { self.total(&self.state, viscous, inside) };
+        self.state.total
     }
 
     fn advance(&mut self, to: &MotionState, knots: &mut Vec<ForceKnot>) {
         let (base, base_v) = self.relative(to);
         loop {
-            let dt = to.t - self.now.t;
-            let end = self.part(1.0, dt, base, base_v);
+            let dt = to.t - self.state.t;
+            let end = self.state_at_share(1.0, dt, base, base_v);
             if !self.gives_way(&end) {
-                self.now = Memory { t: to.t, ..end };
+                self.state = LawState { t: to.t, ..end };
                 break;
             }
             let (mut low, mut high, mut at) = (0.0, 1.0, end);
             while (high - low) * dt > INSTANT_S {
                 let middle = 0.5 * (low + high);
-                let m = self.part(middle, dt, base, base_v);
+                let m = self.state_at_share(middle, dt, base, base_v);
                 if self.gives_way(&m) {
                     (high, at) = (middle, m);
                 } else {
                     low = middle;
                 }
             }
-            self.now = at;
-            knots.push(ForceKnot { t: self.now.t, force_n: self.now.total });
+            self.state = at;
+            knots.push(ForceKnot { t: self.state.t, force_n: self.state.total });
             self.rupture();
-            knots.push(ForceKnot { t: self.now.t, force_n: self.now.total });
+            knots.push(ForceKnot { t: self.state.t, force_n: self.state.total });
         }
-        knots.push(ForceKnot { t: self.now.t, force_n: self.now.total });
+        knots.push(ForceKnot { t: self.state.t, force_n: self.state.total });
     }
 
     fn jump(&mut self, to: &MotionState, knots: &mut Vec<ForceKnot>) {
         let (base, base_v) = self.relative(to);
-        self.now.base = base;
-        self.now.base_v = base_v;
-        self.now.before = None;
-        if self.with.spring.is_none() {
-            let m = self.taken_to(0.0, base, base_v);
-            self.now = Memory { base, base_v, ..m };
-            while self.gives_way(&self.now) {
+        self.state.base = base;
+        self.state.base_v = base_v;
+        self.state.before = None;
+        if self.effects.spring.is_none() {
+            let m = self.state_after(0.0, base, base_v);
+            self.state = LawState { base, base_v, ..m };
+            while self.gives_way(&self.state) {
                 self.rupture();
             }
         }
-        knots.push(ForceKnot { t: self.now.t, force_n: self.now.total });
+        knots.push(ForceKnot { t: self.state.t, force_n: self.state.total });
     }
 
     fn ruptures(&self) -> &[f64] {
@@ -475,6 +480,6 @@ impl ForceLaw for PlainWorld {
 
     fn tip_n(&self) -> f64 {
         // No length of needle inside: no friction.
-        self.total(&self.now, 0.0, 0.0)
+        self.total(&self.state, 0.0, 0.0)
     }
 }

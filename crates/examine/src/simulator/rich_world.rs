@@ -1,6 +1,6 @@
 //! A force law of another form, which contains the base law of docs/reference/model.md.
 //!
-//! | ingredient | law | neutral |
+//! | ingredient | law | inactive |
 //! |---|---|---|
 //! | [`Bristles`] | the shaft as elements of at most 0.5 mm, each with friction of its own history: a share `beta` of `b v` is carried by bristles `p' = kappa v - (r kappa/(beta b) + 1/tau) p`, `kappa = beta b v_ref/delta`, `r = abs(v)/(abs(v) + v_c)`, so that steady sliding without creep is `beta b (v + v_c)`; `tau` is creep | `beta = 0` |
 //! | [`Foundation`] | the active layer rests on a spring `G = K/phi` with a time constant: its far face yields by `u`, `f_K = K (x - u)`, `G tau u' = f_K - G u`, and it tears at `z - u` | `phi = 0` |
@@ -166,7 +166,7 @@ impl Shaft {
     }
 
     /// Moves the tip to `z`: adds covered elements with bristles at rest, or removes uncovered ones.
-    fn cover(&mut self, z: f64) {
+    fn set_covered_length(&mut self, z: f64) {
         while let Some(e) = self.elements.get(self.full.len()) {
             let share = ((z - e.front) / e.length).clamp(0.0, 1.0);
             if share > self.covered {
@@ -213,7 +213,7 @@ impl Shaft {
 }
 
 #[derive(Clone, Copy, Default)]
-struct Memory {
+struct LawState {
     t: f64,
     base: f64,
     v: f64,
@@ -236,7 +236,7 @@ pub struct RichWorld {
     surface: f64,
     with: RichEffects,
     shaft: Shaft,
-    now: Memory,
+    now: LawState,
     ruptures: Vec<f64>,
     released: Vec<f64>,
     /// Ruptures in progress: force released and position.
@@ -261,7 +261,7 @@ impl RichWorld {
             surface: tissue.surface_m,
             with: *with,
             shaft: Shaft::new(tissue),
-            now: Memory::default(),
+            now: LawState::default(),
             ruptures: Vec::new(),
             released: Vec::new(),
             torn: VecDeque::new(),
@@ -269,7 +269,7 @@ impl RichWorld {
     }
 
     /// Axial retreat of the bending needle's tip in m.
-    fn falls_back(&self) -> f64 {
+    fn bending_retreat_m(&self) -> f64 {
         self.with.bending.map_or(0.0, |b| {
             let aside = b.ratio * self.now.tip_n * b.compliance_m_per_n;
             0.6 * aside * aside / b.length_m
@@ -277,16 +277,16 @@ impl RichWorld {
     }
 
     /// The state after a share `s` of the step of the base, without a rupture.
-    fn part(&self, s: f64, dt: f64, base: f64, v: f64) -> Memory {
+    fn state_at_share(&self, s: f64, dt: f64, base: f64, v: f64) -> LawState {
         let from = &self.now;
         let dt = dt * s;
-        let mut to = Memory {
+        let mut to = LawState {
             t: from.t + dt,
             base: from.base + (base - from.base) * s,
             v: from.v + (v - from.v) * s,
             ..*from
         };
-        to.z = to.base - self.falls_back();
+        to.z = to.base - self.bending_retreat_m();
         to.deepest = from.deepest.max(to.z);
         to.active_n = 0.0;
         if let Some(&(front, _, stiffness, puncture)) = self.layers.get(self.ruptures.len()) {
@@ -306,24 +306,24 @@ impl RichWorld {
             if let Some(d) = self.with.damage
                 && puncture < f64::INFINITY
             {
-                to.damage += grown(&d, dt, from.active_n / puncture, to.active_n / puncture);
+                to.damage += damage_growth(&d, dt, from.active_n / puncture, to.active_n / puncture);
             }
         }
         if let (Some(m), Some(d)) = (self.with.membrane, self.with.damage) {
             let before = self.membrane_n(from) / m.puncture_n;
-            to.membrane_damage += grown(&d, dt, before, self.membrane_n(&to) / m.puncture_n);
+            to.membrane_damage += damage_growth(&d, dt, before, self.membrane_n(&to) / m.puncture_n);
         }
         to
     }
 
-    fn membrane_n(&self, m: &Memory) -> f64 {
+    fn membrane_n(&self, m: &LawState) -> f64 {
         match self.with.membrane {
             Some(x) if !m.membrane_gone => x.stiffness_n_per_m * (m.z - self.surface - x.depth_m).max(0.0),
             _ => 0.0,
         }
     }
 
-    fn layer_gives_way(&self, m: &Memory) -> bool {
+    fn layer_gives_way(&self, m: &LawState) -> bool {
         self.layers.get(self.ruptures.len()).is_some_and(|&(_, far, _, puncture)| {
             let by_force = match self.with.damage {
                 Some(_) => m.damage >= 1.0,
@@ -333,7 +333,7 @@ impl RichWorld {
         })
     }
 
-    fn membrane_gives_way(&self, m: &Memory) -> bool {
+    fn membrane_gives_way(&self, m: &LawState) -> bool {
         self.with.membrane.is_some_and(|x| {
             !m.membrane_gone
                 && match self.with.damage {
@@ -343,12 +343,12 @@ impl RichWorld {
         })
     }
 
-    fn gives_way(&self, m: &Memory) -> bool {
+    fn gives_way(&self, m: &LawState) -> bool {
         self.layer_gives_way(m) || self.membrane_gives_way(m)
     }
 
     /// Accepts a state: updates the shaft and sums up the force.
-    fn take(&mut self, to: Memory) {
+    fn accept_state(&mut self, to: LawState) {
         let dt = to.t - self.now.t;
         if let Some(b) = self.with.bristles {
             let v = 0.5 * (self.now.v + to.v);
@@ -362,11 +362,11 @@ impl RichWorld {
             self.shaft.relax(keep, give);
         }
         self.now = to;
-        self.shaft.cover(to.z);
-        self.sum_up();
+        self.shaft.set_covered_length(to.z);
+        self.update_force();
     }
 
-    fn sum_up(&mut self) {
+    fn update_force(&mut self) {
         let m = self.now;
         let mut tip = m.active_n + self.membrane_n(&m);
         if let Some(t) = self.with.tearing {
@@ -401,15 +401,15 @@ impl RichWorld {
             self.now.yielded = 0.0;
             // Force of the next layer at this position.
             self.now.active_n = 0.0;
-            self.now = self.part(0.0, 0.0, m.base, m.v);
+            self.now = self.state_at_share(0.0, 0.0, m.base, m.v);
             self.released.push(m.active_n - self.now.active_n);
         }
-        self.sum_up();
+        self.update_force();
     }
 }
 
 /// Growth of damage over `dt` between two relative forces.
-fn grown(damage: &Damage, dt: f64, from: f64, to: f64) -> f64 {
+fn damage_growth(damage: &Damage, dt: f64, from: f64, to: f64) -> f64 {
     // Below 0.3 of the force, damage with an exponent of five or more is negligible.
     let power = |x: f64| if x < 0.3 { 0.0 } else { libm::pow(x, damage.exponent) };
     dt / damage.time_s * 0.5 * (power(from) + power(to))
@@ -417,10 +417,10 @@ fn grown(damage: &Damage, dt: f64, from: f64, to: f64) -> f64 {
 
 impl ForceLaw for RichWorld {
     fn start(&mut self, at: &MotionState) -> f64 {
-        self.now = Memory { t: at.t, base: at.z, v: at.v, z: at.z, deepest: at.z, ..Memory::default() };
-        self.now = self.part(0.0, 0.0, at.z, at.v);
-        self.shaft.cover(at.z);
-        self.sum_up();
+        self.now = LawState { t: at.t, base: at.z, v: at.v, z: at.z, deepest: at.z, ..LawState::default() };
+        self.now = self.state_at_share(0.0, 0.0, at.z, at.v);
+        self.shaft.set_covered_length(at.z);
+        self.update_force();
         while self.gives_way(&self.now) {
             self.rupture();
         }
@@ -430,22 +430,22 @@ impl ForceLaw for RichWorld {
     fn advance(&mut self, to: &MotionState, knots: &mut Vec<ForceKnot>) {
         loop {
             let dt = to.t - self.now.t;
-            let end = self.part(1.0, dt, to.z, to.v);
+            let end = self.state_at_share(1.0, dt, to.z, to.v);
             if !self.gives_way(&end) {
-                self.take(Memory { t: to.t, ..end });
+                self.accept_state(LawState { t: to.t, ..end });
                 break;
             }
             let (mut low, mut high, mut at) = (0.0, 1.0, end);
             while (high - low) * dt > INSTANT_S {
                 let middle = 0.5 * (low + high);
-                let m = self.part(middle, dt, to.z, to.v);
+                let m = self.state_at_share(middle, dt, to.z, to.v);
                 if self.gives_way(&m) {
                     (high, at) = (middle, m);
                 } else {
                     low = middle;
                 }
             }
-            self.take(at);
+            self.accept_state(at);
             knots.push(ForceKnot { t: self.now.t, force_n: self.now.total });
             self.rupture();
             knots.push(ForceKnot { t: self.now.t, force_n: self.now.total });
@@ -456,7 +456,7 @@ impl ForceLaw for RichWorld {
     fn jump(&mut self, to: &MotionState, knots: &mut Vec<ForceKnot>) {
         self.now.base = to.z;
         self.now.v = to.v;
-        self.sum_up();
+        self.update_force();
         knots.push(ForceKnot { t: self.now.t, force_n: self.now.total });
     }
 

@@ -92,7 +92,7 @@ impl FileFormat {
 }
 
 /// An open file of another program.
-pub(crate) enum Foreign<'a> {
+pub(crate) enum OpenFile<'a> {
     /// A spreadsheet as a text table in UTF-8, with one line per row.
     #[cfg_attr(not(feature = "formats"), allow(dead_code, reason = "spreadsheets need the feature"))]
     Text(Vec<u8>),
@@ -100,7 +100,7 @@ pub(crate) enum Foreign<'a> {
     Columns(ColumnsOfFile<'a>),
 }
 
-impl<'a> Foreign<'a> {
+impl<'a> OpenFile<'a> {
     /// Opens a file.
     ///
     /// # Errors
@@ -113,13 +113,13 @@ impl<'a> Foreign<'a> {
     ) -> Result<Self, RecordError> {
         let foreign = |what: String| RecordError::Foreign { path: path.to_owned(), kind: kind.name(), what };
         // The libraries panic on some damaged files.
-        catch_unwind(AssertUnwindSafe(|| Self::open_unguarded(kind, bytes, path, map)))
+        catch_unwind(AssertUnwindSafe(|| Self::open_unprotected(kind, bytes, path, map)))
             .unwrap_or_else(|_| Err("it is damaged".to_owned()))
             .map_err(foreign)
     }
 
     #[cfg_attr(not(feature = "formats"), allow(unused_variables))]
-    fn open_unguarded(
+    fn open_unprotected(
         kind: FileFormat,
         bytes: &'a [u8],
         path: &Path,

@@ -82,7 +82,7 @@ impl ColumnsOfFile<'_> {
             return Err(self.error(format!("it has no column of numbers{why}")));
         }
         let head = TableHead::of_columns(path, &names, &units, &kinds);
-        let samples = column_samples(head, &self.read_rivals(head));
+        let samples = column_samples(head, &self.read_competing_columns(head));
         let mapped = map(TableHead { samples: &samples, ..head });
         let mapped = mapped.map_err(|error| match (error, unreadable.is_empty()) {
             (error, true) => error,
@@ -96,7 +96,7 @@ impl ColumnsOfFile<'_> {
     }
 
     /// Columns of length and force where there are several, whose values decide between them; none if they cannot be read.
-    fn read_rivals(&self, head: TableHead<'_>) -> Vec<NamedValues> {
+    fn read_competing_columns(&self, head: TableHead<'_>) -> Vec<NamedValues> {
         let all_of = |dimension: Dimension| {
             let is_one = |at: &usize| unit_of(head, *at).is_some_and(|unit| unit.dimension == dimension);
             let all: Vec<&str> =

@@ -100,7 +100,7 @@ struct StoredAs {
 }
 
 impl StoredAs {
-    /// The number of a stored integer of so many bits; unsigned ones are stored in a signed type.
+    /// The number for a stored integer of `bits` bits; unsigned ones are stored in a signed type.
     fn number(&self, stored: i64, bits: u32) -> f64 {
         let value =
             if self.unsigned && stored < 0 { stored as f64 + 2_f64.powi(bits as i32) } else { stored as f64 };

@@ -10,35 +10,35 @@ use crate::insertion_axis::project;
 use crate::text::layout::ColumnKind;
 use crate::text::rows::RowsRead;
 use crate::time_order::MIN_SAMPLE_NUMBERS;
-use crate::units::{Dimension, is_commanded, is_other, quantity_of, split_name, vector_of};
+use crate::units::{Dimension, is_commanded, is_other_quantity, quantity_of, split_name, vector_of};
 
 /// Share of the variance from which one of three components is used instead of all.
 const MAIN_COMPONENT_SHARE: f64 = 0.99;
 
 /// The columns of a recording with the conversion of each row.
-pub(super) struct Chosen {
+pub(super) struct ChosenColumns {
     pub candidates: Vec<Candidate>,
     pub map: ColumnMap,
     pub map_needed: bool,
     /// Errors that the readers would report about the columns.
     pub errors: Vec<(Role, RecordError)>,
-    time: Option<Source>,
-    position: Option<Source>,
-    force: Option<Source>,
+    time: Option<ValueSource>,
+    position: Option<ValueSource>,
+    force: Option<ValueSource>,
     rate_hz: Option<f64>,
     counts_samples: bool,
 }
 
 /// Where the values of a quantity come from.
 #[derive(Debug, Clone)]
-struct Source {
+struct ValueSource {
     indices: Vec<usize>,
     scale: f64,
     offset: f64,
     axis: [f64; 3],
 }
 
-impl Source {
+impl ValueSource {
     fn value(&self, row: &[f64]) -> f64 {
         let part =
             |k: usize| self.indices.get(k).and_then(|index| row.get(*index)).copied().unwrap_or(f64::NAN);
@@ -54,10 +54,10 @@ impl Source {
     }
 }
 
-impl Chosen {
+impl ChosenColumns {
     /// Time, position and force of a row in SI units; NaN for what the file lacks.
     pub(super) fn values(&self, row: &[f64], number: usize) -> [f64; 3] {
-        let of = |source: &Option<Source>| source.as_ref().map_or(f64::NAN, |source| source.value(row));
+        let of = |source: &Option<ValueSource>| source.as_ref().map_or(f64::NAN, |source| source.value(row));
         let time = match (&self.time, self.rate_hz) {
             (Some(source), _) => source.value(row),
             (None, rate) => number as f64 / rate.unwrap_or(1.0),
@@ -139,11 +139,16 @@ fn column_role(role: Role) -> ColumnRole {
 }
 
 /// Chooses the columns.
-pub(super) fn choose(head: TableHead<'_>, scan: &Scan, read: &RowsRead, map: Option<&ColumnMap>) -> Chosen {
+pub(super) fn choose_columns(
+    head: TableHead<'_>,
+    scan: &Scan,
+    read: &RowsRead,
+    map: Option<&ColumnMap>,
+) -> ChosenColumns {
     let open = ColumnMap::open();
     let given = map.unwrap_or(&open);
     let rate_hz = given.rate_hz;
-    let mut chosen = Chosen {
+    let mut chosen = ChosenColumns {
         candidates: Vec::new(),
         map: map.cloned().unwrap_or_else(ColumnMap::open),
         map_needed: false,
@@ -196,7 +201,7 @@ fn repeated_after(names: &[String]) -> usize {
     (2..all).find(repeats).unwrap_or(all)
 }
 
-impl Chosen {
+impl ChosenColumns {
     fn add(
         &mut self,
         head: TableHead<'_>,
@@ -286,7 +291,7 @@ impl Chosen {
         });
         let rate = if role == Role::Time { self.rate_hz } else { None };
         let axis = self.map.axis.map_or_else(|| main_axis(scan, &found.indices), |(x, y, z)| [x, y, z]);
-        let source = Some(Source {
+        let source = Some(ValueSource {
             indices: found.indices,
             scale: rate.map_or(found.scale, |rate| 1.0 / rate),
             offset: found.offset,
@@ -421,7 +426,7 @@ fn signal_columns(head: TableHead<'_>, scan: &Scan, role: Role, free: &[usize]) 
         .copied()
         // A counter of messages or rows is not a motion.
         .filter(|at| !scan.columns[*at].is_constant() && !scan.columns[*at].is_counter())
-        .filter(|at| !is_other(&head.names[*at]))
+        .filter(|at| !is_other_quantity(&head.names[*at]))
         .collect();
     let of_quantity = |at: &usize| {
         let by_unit = unit_of(head, *at).map(|unit| unit.dimension);

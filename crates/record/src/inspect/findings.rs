@@ -1,6 +1,6 @@
 //! Findings of an inspection: obstacles for the readers, and remarks.
 
-use super::candidates::{Chosen, si_symbol};
+use super::candidates::{ChosenColumns, si_symbol};
 use super::facts::{FileFacts, Rows};
 use super::magnitude::{epoch_unit, in_words};
 use super::scan::Scan;
@@ -46,7 +46,7 @@ pub(super) fn findings(
     head: TableHead<'_>,
     scan: &Scan,
     read: &RowsRead,
-    chosen: &Chosen,
+    chosen: &ChosenColumns,
     sampling: Option<&Sampling>,
     rows: &dyn Rows,
 ) -> Result<Vec<Finding>, RecordError> {
@@ -61,7 +61,7 @@ pub(super) fn findings(
     Ok(found.found)
 }
 
-fn columns(found: &mut Findings<'_>, head: TableHead<'_>, chosen: &Chosen, facts: &FileFacts<'_>) {
+fn columns(found: &mut Findings<'_>, head: TableHead<'_>, chosen: &ChosenColumns, facts: &FileFacts<'_>) {
     let mut said: Vec<String> = Vec::new();
     for (role, error) in &chosen.errors {
         let candidate = chosen.candidates.iter().find(|candidate| candidate.role == *role);
@@ -120,7 +120,7 @@ fn rows_and_values(
     head: TableHead<'_>,
     scan: &Scan,
     read: &RowsRead,
-    chosen: &Chosen,
+    chosen: &ChosenColumns,
     sampling: Option<&Sampling>,
     rows: &dyn Rows,
 ) -> Result<(), RecordError> {
@@ -181,7 +181,7 @@ fn rows_and_values(
     Ok(())
 }
 
-fn time(found: &mut Findings<'_>, head: TableHead<'_>, chosen: &Chosen, sampling: &Sampling) {
+fn time(found: &mut Findings<'_>, head: TableHead<'_>, chosen: &ChosenColumns, sampling: &Sampling) {
     let path = found.path.to_owned();
     let name =
         chosen.indices(Role::Time).first().and_then(|at| head.names.get(*at)).cloned().unwrap_or_default();
@@ -242,7 +242,7 @@ fn time(found: &mut Findings<'_>, head: TableHead<'_>, chosen: &Chosen, sampling
     }
 }
 
-fn units(found: &mut Findings<'_>, head: TableHead<'_>, chosen: &Chosen) {
+fn units(found: &mut Findings<'_>, head: TableHead<'_>, chosen: &ChosenColumns) {
     for candidate in &chosen.candidates {
         let (role, symbol) = (candidate.role, si_symbol(candidate.role));
         let name = candidate.names.first().cloned().unwrap_or_default();

@@ -6,7 +6,7 @@ use std::path::Path;
 
 impl RecordError {
     /// Kind and line of the finding with the same content.
-    fn said(&self) -> Vec<(&'static str, Option<u64>)> {
+    fn matching_findings(&self) -> Vec<(&'static str, Option<u64>)> {
         match self {
             Self::SampleNumber { line, .. } | Self::TimeUnit { line, .. } => {
                 // The finding refers to the line of the names, the error to the first row.
@@ -46,9 +46,10 @@ impl RecordError {
         let first = self.to_string();
         let others = match inspect() {
             Ok(inspection) => {
-                let said = self.said();
+                let matching_findings = self.matching_findings();
                 let new = |finding: &&Finding| {
-                    !first.contains(&finding.message) && !said.contains(&(finding.kind, finding.line))
+                    !first.contains(&finding.message)
+                        && !matching_findings.contains(&(finding.kind, finding.line))
                 };
                 inspection.obstacles().filter(new).map(|finding| finding.message.clone()).collect()
             }

@@ -7,7 +7,7 @@ use crate::column_map::ColumnMap;
 use crate::columns::TableHead;
 use crate::error::RecordError;
 use crate::file_formats::numeric_columns::column_samples;
-use crate::file_formats::{FileFormat, Foreign};
+use crate::file_formats::{FileFormat, OpenFile};
 use crate::table_source::{decoded, read_bytes};
 use crate::text::encoding;
 use crate::text::find::inspect_layout;
@@ -151,8 +151,8 @@ pub fn inspect_bytes(bytes: &[u8], path: &Path, options: &InspectOptions) -> Res
                 map,
             )
         }
-        Some(kind) => match Foreign::open(kind, bytes, path, map)? {
-            Foreign::Text(text) => {
+        Some(kind) => match OpenFile::open(kind, bytes, path, map)? {
+            OpenFile::Text(text) => {
                 let head = std::str::from_utf8(&text).unwrap_or_default();
                 inspect_text(
                     TextSource::Bytes(&text),
@@ -163,7 +163,7 @@ pub fn inspect_bytes(bytes: &[u8], path: &Path, options: &InspectOptions) -> Res
                     map,
                 )
             }
-            Foreign::Columns(source) => {
+            OpenFile::Columns(source) => {
                 let (names, units, kinds) = source.names_and_units();
                 let unreadable = source.source.unreadable();
                 if names.is_empty() {
@@ -242,7 +242,7 @@ fn inspect_rows(
 ) -> Result<Inspection, RecordError> {
     let mut scan = Scan::new(head.names.len().min(MAX_COLUMNS));
     let read = rows.for_each(&mut |_, row| scan.push(row))?;
-    let chosen = candidates::choose(head, &scan, &read, map);
+    let chosen = candidates::choose_columns(head, &scan, &read, map);
     let mut times = Vec::new();
     let mut offsets = Vec::new();
     let mut curves = ThinnedCurves::new(scan.rows);

@@ -19,7 +19,7 @@ const MAX_WORK_RATIO: f64 = -0.3;
 const MIN_FORCE_SD: f64 = 8.0;
 
 /// The note on a recording without an insertion: the position only falls, or the tissue does work on the needle.
-pub(super) fn without_insertion<A: SampleStream>(
+pub(super) fn no_insertion_note<A: SampleStream>(
     recording: &A,
     extent: &Extent,
 ) -> Result<Option<QualityNote>, A::Error> {
@@ -34,7 +34,7 @@ pub(super) fn without_insertion<A: SampleStream>(
         advance_m = advance_m.max(z - lowest_m);
         last_m = z;
     })?;
-    if let Some(note) = both_reversed(recording, extent, first_m)? {
+    if let Some(note) = both_reversed_note(recording, extent, first_m)? {
         return Ok(Some(note));
     }
     if advance_m <= MAX_ADVANCE_SHARE * travel_m {
@@ -68,9 +68,9 @@ const FIRST_SHARE: f64 = 0.1;
 /// Largest mean fall over the first tenth of the way, in units of the largest one; friction of a retraction is largest at its beginning.
 const MAX_FIRST_RATIO: f64 = 0.4;
 
-/// The note on a recording whose position and force both run the other way: the needle first moves backward from its highest position, and the
+/// The note on a recording whose position and force both have the opposite sign: the needle first moves backward from its highest position, and the
 /// force falls from zero with the way. The work is then positive, as of an insertion.
-fn both_reversed<A: SampleStream>(
+fn both_reversed_note<A: SampleStream>(
     recording: &A,
     extent: &Extent,
     first_m: f64,

@@ -226,7 +226,7 @@ const MIN_INTERVALS: usize = 24;
 const MIN_NOISE_RATIO: f64 = 1.0;
 
 /// A force that is noise at every time scale: no contact with tissue.
-pub(super) fn only_in_air<A: SampleStream>(
+pub(super) fn only_in_air_note<A: SampleStream>(
     recording: &A,
     extent: &Extent,
 ) -> Result<Option<QualityNote>, A::Error> {

@@ -24,24 +24,26 @@ pub(super) fn spikes<A: SampleStream>(
     if recording.len() < WINDOW {
         return Ok(None);
     }
-    let off =
-        quantiles_of_stream(&[0.5], |take| from_neighbours(recording, which, |_, away| take(away.abs())))?;
+    let off = quantiles_of_stream(&[0.5], |take| {
+        for_each_deviation(recording, which, |_, deviation| take(deviation.abs()))
+    })?;
     let ends = quantiles_of_stream(&[0.05, 0.95], |take| recording.for_each_value(which, take))?;
     let ([off], [low, high]) = (&off[..], &ends[..]) else { return Ok(None) };
     let robust_sd = (off * MAD_TO_SD).max(MIN_SD_SHARE * (high - low));
     let limit = SPIKE_SD * robust_sd;
-    let mut found = Found::default();
+    let mut found = SpikesFound::default();
     let mut recent = Recent { limit, samples: recording.len(), ring: [(0.0, 0.0); RING_SIZE] };
     let mut sample = 0;
-    from_neighbours(recording, which, |value, away| {
-        recent.ring[sample % RING_SIZE] = (value, away);
+    for_each_deviation(recording, which, |value, deviation| {
+        recent.ring[sample % RING_SIZE] = (value, deviation);
         if sample >= LOOKAHEAD {
-            recent.test_start(sample - LOOKAHEAD, &mut found);
+            recent.add_spike_starting_at(sample - LOOKAHEAD, &mut found);
         }
         sample += 1;
     })?;
-    (sample.saturating_sub(LOOKAHEAD)..sample).for_each(|sample| recent.test_start(sample, &mut found));
-    let Found { count, largest, at } = found;
+    (sample.saturating_sub(LOOKAHEAD)..sample)
+        .for_each(|sample| recent.add_spike_starting_at(sample, &mut found));
+    let SpikesFound { count, largest, at } = found;
     if count == 0 {
         return Ok(None);
     }
@@ -63,7 +65,7 @@ const RING_SIZE: usize = 16;
 
 /// Spikes found so far.
 #[derive(Debug, Default)]
-struct Found {
+struct SpikesFound {
     count: u32,
     largest: f64,
     at: usize,
@@ -78,20 +80,20 @@ struct Recent {
 }
 
 impl Recent {
-    fn away(&self, sample: usize) -> f64 {
+    fn deviation(&self, sample: usize) -> f64 {
         self.ring[sample % RING_SIZE].1
     }
 
     /// Whether two samples are on the same side: near the median, far above or far below.
     fn same_side(&self, a: usize, b: usize) -> bool {
-        let (a, b) = (self.away(a), self.away(b));
+        let (a, b) = (self.deviation(a), self.deviation(b));
         (a.abs() > self.limit) == (b.abs() > self.limit) && (a > 0.0) == (b > 0.0)
     }
 
     /// Adds the spike that starts at the sample, if there is one.
     #[inline]
-    fn test_start(&self, start: usize, found: &mut Found) {
-        if self.away(start).abs() <= self.limit || start < SIDE || self.same_side(start - 1, start) {
+    fn add_spike_starting_at(&self, start: usize, found: &mut SpikesFound) {
+        if self.deviation(start).abs() <= self.limit || start < SIDE || self.same_side(start - 1, start) {
             return;
         }
         let mut end = start + 1;
@@ -107,8 +109,8 @@ impl Recent {
         }
         for at in start..end {
             found.count += 1;
-            if self.away(at).abs() > found.largest.abs() {
-                (found.largest, found.at) = (self.away(at), at);
+            if self.deviation(at).abs() > found.largest.abs() {
+                (found.largest, found.at) = (self.deviation(at), at);
             }
         }
     }
@@ -133,7 +135,7 @@ const WINDOW: usize = 2 * SIDE + 1;
 
 /// Calls `each` with every value and its distance from the median of the eleven samples around it (at the ends: of the
 /// first or last eleven).
-fn from_neighbours<A: SampleStream>(
+fn for_each_deviation<A: SampleStream>(
     recording: &A,
     which: Quantity,
     mut each: impl FnMut(f64, f64),
@@ -153,7 +155,7 @@ fn from_neighbours<A: SampleStream>(
         }
         let old = std::mem::replace(&mut window[next], x);
         next = (next + 1) % WINDOW;
-        exchange(&mut sorted, old, x);
+        replace_in_sorted(&mut sorted, old, x);
         let centre = window[(next + SIDE) % WINDOW];
         each(centre, centre - sorted[SIDE]);
     })?;
@@ -165,7 +167,7 @@ fn from_neighbours<A: SampleStream>(
 
 /// Replaces a value in an ascending window.
 #[inline]
-fn exchange(sorted: &mut [f64; WINDOW], old: f64, new: f64) {
+fn replace_in_sorted(sorted: &mut [f64; WINDOW], old: f64, new: f64) {
     let mut at = sorted.iter().position(|x| x.to_bits() == old.to_bits()).unwrap_or(0);
     while at + 1 < WINDOW && sorted[at + 1].total_cmp(&new).is_lt() {
         sorted[at] = sorted[at + 1];

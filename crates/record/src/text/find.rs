@@ -62,7 +62,7 @@ pub(crate) fn find_table(
             }
             match map_columns(layout.head(path), map) {
                 Ok(_) => {
-                    // The values may tell more than the names.
+                    // The values may identify a column that its name does not.
                     let layout = layout.with_samples(head, spread);
                     let columns = map_columns(layout.head(path), map)?;
                     return Ok((layout, columns));

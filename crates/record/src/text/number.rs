@@ -181,14 +181,14 @@ pub(crate) fn parse_date_ns(text: &str) -> Option<i64> {
     };
     let (time, offset_s) = split_zone(time)?;
     let mut parts = time.split(':');
-    let hours = small(parts.next()?)?;
-    let minutes = small(parts.next()?)?;
+    let hours = parse_digits(parts.next()?)?;
+    let minutes = parse_digits(parts.next()?)?;
     let seconds = parts.next().unwrap_or("0");
     if parts.next().is_some() || hours > 24 || minutes > 59 {
         return None;
     }
     let (whole, fraction) = seconds.split_once(['.', ',']).unwrap_or((seconds, ""));
-    let whole = small(whole)?;
+    let whole = parse_digits(whole)?;
     if whole > 60 || fraction.len() > 12 || !fraction.bytes().all(|b| b.is_ascii_digit()) {
         return None;
     }
@@ -213,7 +213,7 @@ fn parse_duration_ns(text: &str) -> Option<i64> {
     (ns.abs() < 9e18).then_some(ns as i64)
 }
 
-fn small(text: &str) -> Option<i64> {
+fn parse_digits(text: &str) -> Option<i64> {
     ((1..=4).contains(&text.len()) && text.bytes().all(|b| b.is_ascii_digit()))
         .then(|| text.parse().ok())
         .flatten()
@@ -226,18 +226,22 @@ fn split_zone(time: &str) -> Option<(&str, i64)> {
     }
     let Some(at) = time.rfind(['+', '-']) else { return Some((time, 0)) };
     let zone = time[at + 1..].replace(':', "");
-    let value = small(&zone)?;
+    let value = parse_digits(&zone)?;
     let seconds = if zone.len() <= 2 { value * 3600 } else { value / 100 * 3600 + value % 100 * 60 };
     Some((time[..at].trim_end(), if time.as_bytes()[at] == b'-' { -seconds } else { seconds }))
 }
 
 fn days_since_1970(date: &str) -> Option<i64> {
     let mut parts = date.split(['-', '/', '.']);
-    let (a, b, c) = (parts.next()?, small(parts.next()?)?, parts.next()?);
+    let (a, b, c) = (parts.next()?, parse_digits(parts.next()?)?, parts.next()?);
     if parts.next().is_some() {
         return None;
     }
-    let (year, month, day) = if a.len() == 4 { (small(a)?, b, small(c)?) } else { (small(c)?, b, small(a)?) };
+    let (year, month, day) = if a.len() == 4 {
+        (parse_digits(a)?, b, parse_digits(c)?)
+    } else {
+        (parse_digits(c)?, b, parse_digits(a)?)
+    };
     // Month first, as in the USA.
     let (month, day) = if month > 12 { (day, month) } else { (month, day) };
     if !(1..=12).contains(&month) || !(1..=31).contains(&day) || !(1900..=2200).contains(&year) {

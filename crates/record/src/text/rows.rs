@@ -35,7 +35,7 @@ pub(crate) struct RowsRead {
     pub rows: usize,
     pub first_missing: Option<MissingValue>,
     /// Lines at the end that are left out.
-    pub left_out: Option<LeftOut>,
+    pub left_out: Option<TrailingLines>,
     /// Fields that are not numbers, by column; only with [`Tolerance::Lenient`].
     pub bad_values: Vec<BadValues>,
     /// Rows with another number of fields: how many, the line and the error of the first; only with [`Tolerance::Lenient`].
@@ -46,14 +46,14 @@ pub(crate) struct RowsRead {
 
 /// Lines at the end of a file that are no rows: a last row that is cut short, or text such as the statistics of a testing machine.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct LeftOut {
+pub(crate) struct TrailingLines {
     /// Offset of the first.
     pub offset: usize,
     pub lines: usize,
     pub is_text: bool,
 }
 
-impl LeftOut {
+impl TrailingLines {
     /// What was left out, from this line on.
     pub(crate) fn message(self, line: u64) -> String {
         match self.is_text {
@@ -166,8 +166,8 @@ pub(crate) fn read_rows(
     let mut numbers = vec![0.0; wanted.len()];
     let mut read = RowsRead { origins: vec![None; wanted.len()], ..RowsRead::default() };
     // Errors about skipped lines are created at the end, because finding a line number reads the file from its beginning.
-    let mut tail: Option<(LeftOut, Skipped)> = None;
-    let mut ragged: Option<(usize, Ragged)> = None;
+    let mut tail: Option<(TrailingLines, Skipped)> = None;
+    let mut ragged: Option<(usize, RowLengthMismatch)> = None;
     let mut bad: BadFields = Vec::new();
     loop {
         let offset = layout.data_start + usize::try_from(records.offset()).unwrap_or(usize::MAX / 2);
@@ -215,20 +215,20 @@ pub(crate) fn read_rows(
         if let Some((_, skipped)) = tail.take() {
             match (skipped, tolerance) {
                 (skipped, Tolerance::Strict) => return Err(skipped.error(file, layout, wanted)?),
-                (Skipped::Ragged(this), _) => ragged.get_or_insert((0, this)).0 += 1,
+                (Skipped::RowLengthMismatch(this), _) => ragged.get_or_insert((0, this)).0 += 1,
                 (Skipped::Value(this), _) => count_bad(&mut bad, this),
             }
         }
         if let (Some(at), true) = (failed, is_text) {
             let skipped =
                 Skipped::Value(MissingValue { offset, field: at, text: field_text(&row, &wanted[at]) });
-            tail = Some((LeftOut { offset, lines: 1, is_text }, skipped));
+            tail = Some((TrailingLines { offset, lines: 1, is_text }, skipped));
             continue;
         }
         if is_ragged {
-            let this = Ragged { offset, found: row.len(), remedy: remedy_for_row(&row, layout) };
+            let this = RowLengthMismatch { offset, found: row.len(), remedy: remedy_for_row(&row, layout) };
             if is_text || (row.len() < layout.least_width && may_end) {
-                tail = Some((LeftOut { offset, lines: 1, is_text }, Skipped::Ragged(this)));
+                tail = Some((TrailingLines { offset, lines: 1, is_text }, Skipped::RowLengthMismatch(this)));
                 continue;
             }
             match tolerance {
@@ -306,7 +306,7 @@ fn begins_with_text(row: &csv::ByteRecord, layout: &TextLayout) -> bool {
 
 /// A line that is no row, which is an error unless it is at the end.
 enum Skipped {
-    Ragged(Ragged),
+    RowLengthMismatch(RowLengthMismatch),
     Value(MissingValue),
 }
 
@@ -318,20 +318,20 @@ impl Skipped {
         wanted: &[WantedField],
     ) -> Result<RecordError, RecordError> {
         match self {
-            Self::Ragged(this) => this.error(file, layout),
+            Self::RowLengthMismatch(this) => this.error(file, layout),
             Self::Value(this) => not_a_number(file, layout, this.offset, &wanted[this.field], this.text),
         }
     }
 }
 
 /// A row with another number of fields than the header.
-struct Ragged {
+struct RowLengthMismatch {
     offset: usize,
     found: usize,
     remedy: &'static str,
 }
 
-impl Ragged {
+impl RowLengthMismatch {
     fn error(&self, file: &SourceFile<'_>, layout: &TextLayout) -> Result<RecordError, RecordError> {
         Ok(RecordError::RaggedRow {
             path: file.path(),
@@ -344,7 +344,7 @@ impl Ragged {
 }
 
 /// Nanoseconds from `origin` to `ns`. Of times of day, without a date, the one that is more than half a day before the first is of the next day.
-fn since(origin: i64, ns: i64) -> Option<i64> {
+fn nanoseconds_since(origin: i64, ns: i64) -> Option<i64> {
     const DAY_NS: i64 = 86_400_000_000_000;
     let elapsed = ns.checked_sub(origin)?;
     let is_next_day = (0..DAY_NS).contains(&origin) && (0..DAY_NS).contains(&ns) && elapsed < -DAY_NS / 2;
@@ -359,7 +359,7 @@ fn value(layout: &TextLayout, field: &WantedField, bytes: &[u8], origin: &mut Op
     if field.kind == ColumnKind::Date {
         return match parse_date_ns(text) {
             // Division rounds correctly, multiplication by 1e-9 does not.
-            Some(ns) => since(*origin.get_or_insert(ns), ns).map(|ns| ns as f64 / 1e9),
+            Some(ns) => nanoseconds_since(*origin.get_or_insert(ns), ns).map(|ns| ns as f64 / 1e9),
             None => is_missing(text.trim()).then_some(f64::NAN),
         };
     }

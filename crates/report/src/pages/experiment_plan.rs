@@ -14,7 +14,12 @@ const MAX_CANDIDATES_DRAWN: usize = 7;
 
 /// The page of a plan; `verdict` is the diagnosis it starts from.
 #[must_use]
-pub fn page(scenario: &Scenario, verdict: Option<String>, ground: &InformationState, plan: &Plan) -> Page {
+pub fn page(
+    scenario: &Scenario,
+    verdict: Option<String>,
+    information: &InformationState,
+    plan: &Plan,
+) -> Page {
     let percent = |p: f64| format!("{:.0} %", 100.0 * p);
     let mut tiles = vec![
         Tile::new(
@@ -62,7 +67,7 @@ pub fn page(scenario: &Scenario, verdict: Option<String>, ground: &InformationSt
         .fact("stylet", env!("CARGO_PKG_VERSION"))
         .fact("motions evaluated", plan.motions_evaluated.to_string())
         .section(Section::new("Plan").tiles(tiles));
-    page = page.section(motion(plan, ground)).section(pairs(plan));
+    page = page.section(motion(plan, information)).section(pairs(plan));
     if !plan.simulated.is_empty() {
         let rows = plan
             .simulated
@@ -84,9 +89,9 @@ pub fn page(scenario: &Scenario, verdict: Option<String>, ground: &InformationSt
     page.section(intervals(plan)).section(alternatives(plan))
 }
 
-fn motion(plan: &Plan, ground: &InformationState) -> Section {
+fn motion(plan: &Plan, information: &InformationState) -> Section {
     let mut section = Section::new("Proposed motion");
-    if let Some(e) = ground.expected_forces(&plan.motion) {
+    if let Some(e) = information.expected_forces(&plan.motion) {
         let mm: Vec<f64> = e.position_m.iter().map(|z| 1e3 * z).collect();
         section = section.chart(
             Chart::new("Position", "Time (s)", "Position (mm)")
@@ -102,7 +107,7 @@ fn motion(plan: &Plan, ground: &InformationState) -> Section {
             .group("plan")
             .height(260);
         for (k, f) in e.force_n.iter().enumerate().take(MAX_CANDIDATES_DRAWN) {
-            let name = effect_label(ground.name(k));
+            let name = effect_label(information.name(k));
             forces = forces.with_series(
                 Series::line(name.clone(), Colour::nth(k), e.time_s.clone(), f.clone()).width(1.3),
             );

@@ -298,7 +298,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_says_which_recordings_made_the_model() {
+    fn the_page_states_which_recordings_the_model_was_fitted_to() {
         let of = |recordings: Vec<RecordingPrediction>| Prediction {
             recordings,
             rmse_n: 0.02,

@@ -28,13 +28,13 @@ impl Panel<'_> {
     }
 
     fn py(&self, y: f64) -> f64 {
-        let part = (bend(self.chart.scale, y) - self.y.0) / (self.y.1 - self.y.0);
+        let part = (to_chart_scale(self.chart.scale, y) - self.y.0) / (self.y.1 - self.y.0);
         self.top + self.height * (1.0 - part)
     }
 }
 
 /// The ordinate on the chart's scale (linear, log10 or asinh).
-fn bend(scale: Scale, y: f64) -> f64 {
+fn to_chart_scale(scale: Scale, y: f64) -> f64 {
     match scale {
         Scale::Linear => y,
         Scale::Log => {
@@ -79,7 +79,7 @@ fn ordinates(chart: &Chart, height: f64) -> (f64, f64) {
     let (low, high) = data.unwrap_or((0.0, 1.0));
     let positive = chart.series.iter().flat_map(|s| s.y.iter().copied()).filter(|y| *y > 0.0);
     let low = if chart.scale == Scale::Log { finite_extent(positive).map_or(0.1, |e| e.0) } else { low };
-    let (low, high) = (bend(chart.scale, low), bend(chart.scale, high));
+    let (low, high) = (to_chart_scale(chart.scale, low), to_chart_scale(chart.scale, high));
     let (low, high) = if high > low { (low, high) } else { (low - 0.5, low + 0.5) };
     let labels = usize::from(chart.bands.iter().any(|b| !b.label.is_empty()))
         + usize::from(chart.markers.iter().any(|set| set.marks.iter().any(|(_, label)| !label.is_empty())));
@@ -197,7 +197,7 @@ fn dash(style: LineStyle) -> &'static str {
 }
 
 /// Up to this many points have a rim in the background colour; with more, the rims would hide the points below.
-const CROWD: usize = 100;
+const MAX_POINTS_WITH_RIM: usize = 100;
 
 fn draw_series(canvas: &mut Canvas, panel: &Panel<'_>, series: &Series) {
     let mut runs: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
@@ -218,7 +218,7 @@ fn draw_series(canvas: &mut Canvas, panel: &Panel<'_>, series: &Series) {
         run.push(point);
     }
     if series.style == LineStyle::Points {
-        let rim = if series.x.len() > CROWD { "" } else { "p " };
+        let rim = if series.x.len() > MAX_POINTS_WITH_RIM { "" } else { "p " };
         for (x, y) in runs.into_iter().flatten() {
             canvas.circle(x, y, series.width_px, &format!("{rim}f-{}", series.colour.name()));
         }

@@ -45,7 +45,7 @@ fn layers() -> Vec<Layer> {
     out
 }
 
-/// The run with as many combinations as asked for (`paper/ml/force_torque`, `paper/kv/force_torque`, ...).
+/// The run with the requested number of combinations (`paper/ml/force_torque`, `paper/kv/force_torque`, ...).
 pub fn synthetic_run(combinations: usize) -> RunReport {
     let count = (50.0 * RATE_HZ) as usize + 1;
     let time_s: Vec<f64> = (0..count).map(|i| i as f64 / RATE_HZ).collect();
@@ -141,7 +141,7 @@ fn true_rupture(i: usize, layer: &Layer) -> TrueRupture {
     }
 }
 
-/// Recursive least squares over the layers as they truly begin, with detections a sample or two late.
+/// Recursive least squares over the true layers, with detections a sample or two late.
 fn combination(
     name: &str,
     which: usize,

@@ -2,7 +2,7 @@
 
 use crate::claim_protocol::Protocol;
 use crate::claim_verdict::{Trial, Verdict};
-use crate::effect_size::{Bar, Effect, Says};
+use crate::effect_size::{Criterion, CriterionResult, Effect};
 use serde::Serialize;
 
 /// An effect under a named condition.
@@ -10,25 +10,25 @@ use serde::Serialize;
 pub struct Condition {
     /// Name of the condition.
     pub name: String,
-    /// The bar that the effect is compared with.
-    pub bar: Bar,
+    /// Criterion that the effect is compared with.
+    pub bar: Criterion,
     /// The effect.
     #[serde(flatten)]
     pub effect: Effect,
     /// Whether the effect supports or contradicts the claim.
-    pub says: Says,
+    pub says: CriterionResult,
 }
 
 /// The primary condition's result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Primary {
-    /// The bar that the effect is compared with.
-    pub bar: Bar,
+    /// Criterion that the effect is compared with.
+    pub bar: Criterion,
     /// The effect over all experiments of the condition.
     #[serde(flatten)]
     pub effect: Effect,
     /// Whether the effect supports or contradicts the claim.
-    pub says: Says,
+    pub says: CriterionResult,
     /// The experiments one by one; they do not decide.
     pub parts: Vec<Condition>,
 }
@@ -59,7 +59,7 @@ pub struct Claim {
 
 impl Claim {
     /// Changes of assumed values that change the verdict.
-    pub fn hangs_on(&self) -> impl Iterator<Item = &Trial> {
+    pub fn verdict_changing_trials(&self) -> impl Iterator<Item = &Trial> {
         self.trials.iter().filter(|t| t.decides)
     }
 }

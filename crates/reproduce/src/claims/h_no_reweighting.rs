@@ -1,10 +1,12 @@
 //! (h1) 40 Hz without re-weighting reconstructs much better than resets only at ruptures; (h2) it compensates
 //! little.
 
-use super::claim_definition::{Definition, KNOWN, PUBLISHED, known, protocol, published};
-use super::g_only_ruptures::NUMBERS;
+use super::claim_definition::{
+    Definition, KNOWN_DEPTH, PUBLISHED_TUNING, protocol, with_known_depth, with_published_tuning,
+};
+use super::g_resets_only_at_ruptures::ASSUMED_VALUES;
 use crate::algorithm_variant::Ablation;
-use crate::effect_size::{Bar, Measured, Part, Scale};
+use crate::effect_size::{Criterion, ExperimentValues, Measured, Scale};
 use crate::paper_experiments::Case;
 use crate::study_conditions::View;
 
@@ -19,7 +21,7 @@ fn reconstruction(view: &View<'_>) -> Measured {
             .iter()
             .zip(rarely)
             .map(|(a, b)| Some(a.score.reconstruction_rms_n? / b.score.reconstruction_rms_n?));
-        Part::new(case.name(), ratio)
+        ExperimentValues::new(case.name(), ratio)
     });
     Measured { scale: Scale::Ratio, parts: parts.collect() }
 }
@@ -27,19 +29,22 @@ fn reconstruction(view: &View<'_>) -> Measured {
 fn compensation(view: &View<'_>) -> Measured {
     let parts = TARGETS.iter().map(|&case| {
         let runs = view.without(case, Ablation::NoReweight);
-        Part::new(case.name(), runs.iter().map(|o| if o.estimated > 0 { o.cumulative_ratio } else { None }))
+        ExperimentValues::new(
+            case.name(),
+            runs.iter().map(|o| if o.estimated > 0 { o.cumulative_ratio } else { None }),
+        )
     });
     Measured { scale: Scale::Mean, parts: parts.collect() }
 }
 
 pub(super) fn reconstructs() -> Definition {
-    Definition::new(protocol!("h1"), reconstruction, Bar::Below(0.5), &NUMBERS)
-        .also(KNOWN, |v| reconstruction(&known(v)))
-        .also(PUBLISHED, |v| reconstruction(&published(v)))
+    Definition::new(protocol!("h1"), reconstruction, Criterion::Below(0.5), &ASSUMED_VALUES)
+        .with_sensitivity(KNOWN_DEPTH, |v| reconstruction(&with_known_depth(v)))
+        .with_sensitivity(PUBLISHED_TUNING, |v| reconstruction(&with_published_tuning(v)))
 }
 
 pub(super) fn compensates() -> Definition {
-    Definition::new(protocol!("h2"), compensation, Bar::Below(0.1), &NUMBERS)
-        .also(KNOWN, |v| compensation(&known(v)))
-        .also(PUBLISHED, |v| compensation(&published(v)))
+    Definition::new(protocol!("h2"), compensation, Criterion::Below(0.1), &ASSUMED_VALUES)
+        .with_sensitivity(KNOWN_DEPTH, |v| compensation(&with_known_depth(v)))
+        .with_sensitivity(PUBLISHED_TUNING, |v| compensation(&with_published_tuning(v)))
 }

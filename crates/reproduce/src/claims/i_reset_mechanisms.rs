@@ -2,14 +2,14 @@
 
 use super::claim_definition::{Definition, protocol};
 use crate::algorithm_variant::Ablation;
-use crate::assumed_value_changes::Number;
-use crate::effect_size::{Bar, Measured, Part, Scale};
+use crate::assumed_value_changes::AssumedValue;
+use crate::effect_size::{Criterion, ExperimentValues, Measured, Scale};
 use crate::paper_experiments::Case;
 use crate::run_outcome::Outcome;
 use crate::study_conditions::View;
 
 /// Equivalent: within a quarter, as is customary (0.8 to 1.25).
-const EQUIVALENT: Bar = Bar::Below(1.25);
+const EQUIVALENT: Criterion = Criterion::Below(1.25);
 
 /// All insertions by force/torque sensor.
 const ALL: [Case; 10] = [
@@ -26,7 +26,7 @@ const ALL: [Case; 10] = [
 ];
 
 /// Ratio of the larger to the smaller value.
-fn apart(view: &View<'_>, scale: Scale, value: fn(&Outcome) -> Option<f64>) -> Measured {
+fn larger_over_smaller(view: &View<'_>, scale: Scale, value: fn(&Outcome) -> Option<f64>) -> Measured {
     let parts = ALL.iter().map(|&case| {
         let frequency = view.ml(case);
         let threshold = view.without(case, Ablation::Trace);
@@ -34,7 +34,7 @@ fn apart(view: &View<'_>, scale: Scale, value: fn(&Outcome) -> Option<f64>) -> M
             let ratio = value(a)? / value(b)?;
             Some(ratio.max(1.0 / ratio)).filter(|r| r.is_finite())
         });
-        Part::new(case.name(), fold)
+        ExperimentValues::new(case.name(), fold)
     });
     Measured { scale, parts: parts.collect() }
 }
@@ -43,28 +43,35 @@ fn enhanced(outcome: &Outcome) -> Option<f64> {
     outcome.score.enhancement.rms_relative
 }
 
-const NUMBERS: [Number; 15] = [
-    Number::Noise,
-    Number::GelStiffness,
-    Number::GelFriction,
-    Number::GelContrast,
-    Number::StackStiffness,
-    Number::StackFriction,
-    Number::Latex,
-    Number::LiverStiffness,
-    Number::LiverFriction,
-    Number::LiverPuncture,
-    Number::LiverThickness,
-    Number::AbdomenStiffness,
-    Number::AbdomenFriction,
-    Number::Start,
-    Number::Behind,
+const ASSUMED_VALUES: [AssumedValue; 15] = [
+    AssumedValue::Noise,
+    AssumedValue::GelStiffness,
+    AssumedValue::GelFriction,
+    AssumedValue::GelContrast,
+    AssumedValue::StackStiffness,
+    AssumedValue::StackFriction,
+    AssumedValue::LatexPuncture,
+    AssumedValue::LiverStiffness,
+    AssumedValue::LiverFriction,
+    AssumedValue::LiverPuncture,
+    AssumedValue::LiverThickness,
+    AssumedValue::AbdomenStiffness,
+    AssumedValue::AbdomenFriction,
+    AssumedValue::TravelInAir,
+    AssumedValue::TimeBehindTarget,
 ];
 
 pub(super) fn definition() -> Definition {
-    Definition::new(protocol!("i"), |v| apart(v, Scale::Ratio, enhanced), EQUIVALENT, &NUMBERS)
-        .also("reconstruction error instead of the enhanced force's", |v| {
-            apart(v, Scale::Ratio, |o| o.score.reconstruction_rms_n)
-        })
-        .also("the insertion that differs most", |v| apart(v, Scale::LargestRatio, enhanced))
+    Definition::new(
+        protocol!("i"),
+        |v| larger_over_smaller(v, Scale::Ratio, enhanced),
+        EQUIVALENT,
+        &ASSUMED_VALUES,
+    )
+    .with_sensitivity("reconstruction error instead of the enhanced force's", |v| {
+        larger_over_smaller(v, Scale::Ratio, |o| o.score.reconstruction_rms_n)
+    })
+    .with_sensitivity("the insertion that differs most", |v| {
+        larger_over_smaller(v, Scale::LargestRatio, enhanced)
+    })
 }

@@ -7,7 +7,7 @@
 
 use super::claim_definition::{Definition, protocol};
 use crate::all_runs::NOISE_MN;
-use crate::effect_size::{Bar, Measured, Part, Scale};
+use crate::effect_size::{Criterion, ExperimentValues, Measured, Scale};
 use crate::paper_experiments::Case;
 use crate::simulated_insertion::Insertion;
 use crate::study_conditions::View;
@@ -16,9 +16,9 @@ use stylet_core::Rls;
 /// The prior variance of both parameters, `sigma_0²`.
 const PRIOR: f64 = 1e6;
 /// Up to rounding: relative to the largest force and parameter.
-const ROUNDING: Bar = Bar::Below(1e-6);
+const ROUNDING: Criterion = Criterion::Below(1e-6);
 /// Samples after which a covariance is no longer diagonal.
-const TEN: usize = 10;
+const NON_DIAGONAL_FROM: usize = 10;
 
 type Samples = Vec<([f64; 2], f64)>;
 
@@ -36,9 +36,9 @@ enum Weighting {
 }
 
 /// Largest relative difference of two covariances' entries, relative to the larger diagonal entry.
-fn of_matrices(weight: [f64; 2], samples: &Samples) -> f64 {
+fn relative_difference(weight: [f64; 2], samples: &Samples) -> f64 {
     let mut rls = Rls::new([PRIOR, PRIOR]);
-    for (phi, y) in samples.iter().take(TEN) {
+    for (phi, y) in samples.iter().take(NON_DIAGONAL_FROM) {
         rls.update(*phi, *y, 1.0);
     }
     // Off the diagonal W P has w_i² p, Lambda P Lambda has w_1 w_2 p.
@@ -75,10 +75,10 @@ fn difference(samples: &Samples, weight: [f64; 2], weighting: Weighting) -> f64 
 }
 
 fn measured(view: &View<'_>, weighting: Weighting) -> Measured {
-    let seeds = if view.study.is_asking() { 0 } else { view.seeds };
+    let seeds = if view.study.is_planning() { 0 } else { view.seeds };
     let part = |values: Vec<Option<f64>>| Measured {
         scale: Scale::Mean,
-        parts: vec![Part::new(Case::LatexSinusoidal.name(), values)],
+        parts: vec![ExperimentValues::new(Case::LatexSinusoidal.name(), values)],
     };
     let insertion = Case::LatexSinusoidal.scenario().ok().and_then(|s| Insertion::of(&s, 1).ok());
     let Some((insertion, layer)) = insertion.as_ref().and_then(|i| Some((i, i.layers.first()?))) else {
@@ -101,7 +101,7 @@ fn measured(view: &View<'_>, weighting: Weighting) -> Measured {
             _ => [1.0, 1.0 / mean_mps],
         };
         Some(match weighting {
-            Weighting::FullCovariance => of_matrices(weight, &samples),
+            Weighting::FullCovariance => relative_difference(weight, &samples),
             _ => difference(&samples, weight, weighting),
         })
     });
@@ -110,14 +110,19 @@ fn measured(view: &View<'_>, weighting: Weighting) -> Measured {
 
 pub(super) fn definition() -> Definition {
     let mut claim = Definition::new(protocol!("j"), |v| measured(v, Weighting::MeanSpeed), ROUNDING, &[])
-        .also("weights that are powers of two, bit for bit", |v| measured(v, Weighting::PowersOfTwo))
-        .also("eq. (11) iterated as printed, Lambda at every step", |v| measured(v, Weighting::EveryStep))
-        .also("W P instead of Lambda P Lambda after ten samples (eq. 9 for a full covariance)", |v| {
-            measured(v, Weighting::FullCovariance)
-        });
+        .with_sensitivity("weights that are powers of two, bit for bit", |v| {
+            measured(v, Weighting::PowersOfTwo)
+        })
+        .with_sensitivity("eq. (11) iterated as printed, Lambda at every step", |v| {
+            measured(v, Weighting::EveryStep)
+        })
+        .with_sensitivity(
+            "W P instead of Lambda P Lambda after ten samples (eq. 9 for a full covariance)",
+            |v| measured(v, Weighting::FullCovariance),
+        );
     // Bit for bit: any nonzero difference is above this.
     if let Some(exact) = claim.sensitivities.first_mut() {
-        exact.bar = Bar::Below(f64::MIN_POSITIVE);
+        exact.bar = Criterion::Below(f64::MIN_POSITIVE);
     }
     claim
 }

@@ -1,14 +1,14 @@
-//! The claims of the paper. One file per claim or group of claims holds the measure; bar, conditions and sources are given in the protocol
+//! The claims of the paper. One file per claim or group of claims holds the measure; criterion, conditions and sources are given in the protocol
 //! of the claim (`claims/*.md`), which was written before the runs.
 
-mod a_friction_apart;
-mod b_slightly_lower;
+mod a_friction_does_not_overlap;
+mod b_friction_slightly_lower;
 mod c_multi_layer_better;
 mod claim;
 mod claim_definition;
-mod d_kelvin_voigt_over;
+mod d_kelvin_voigt_overcompensates;
 mod e_f_detection;
-mod g_only_ruptures;
+mod g_resets_only_at_ruptures;
 mod h_no_reweighting;
 mod i_reset_mechanisms;
 mod j_weighting;
@@ -17,7 +17,7 @@ mod verdict_reason;
 pub use claim::{Claim, Condition, Primary};
 use claim_definition::protocol;
 pub use claim_definition::{Definition, Measure, Sensitivity};
-pub(crate) use d_kelvin_voigt_over::VISIBLY;
+pub(crate) use d_kelvin_voigt_overcompensates::VISIBLE_RATIO;
 
 use crate::all_runs::Study;
 
@@ -25,18 +25,18 @@ use crate::all_runs::Study;
 #[must_use]
 pub fn definitions() -> Vec<Definition> {
     let mut all = vec![
-        a_friction_apart::definition(),
+        a_friction_does_not_overlap::definition(),
         Definition::untestable(protocol!("a2")),
-        b_slightly_lower::online(),
-        b_slightly_lower::sinusoidal(),
-        c_multi_layer_better::behind_the_gel(),
+        b_friction_slightly_lower::online(),
+        b_friction_slightly_lower::sinusoidal(),
+        c_multi_layer_better::force_after_exit(),
         c_multi_layer_better::on_the_liver(),
-        d_kelvin_voigt_over::definition(),
+        d_kelvin_voigt_overcompensates::definition(),
     ];
     all.extend(e_f_detection::definitions());
     all.extend([
         Definition::untestable(protocol!("f2")),
-        g_only_ruptures::definition(),
+        g_resets_only_at_ruptures::definition(),
         h_no_reweighting::reconstructs(),
         h_no_reweighting::compensates(),
         i_reset_mechanisms::definition(),
@@ -48,7 +48,7 @@ pub fn definitions() -> Vec<Definition> {
 /// Evaluates all claims.
 #[must_use]
 pub fn all(study: &Study) -> Vec<Claim> {
-    definitions().iter().map(|d| d.judge(study)).collect()
+    definitions().iter().map(|d| d.evaluate(study)).collect()
 }
 
 #[cfg(test)]
@@ -70,8 +70,13 @@ mod tests {
             assert_eq!(bar, protocol.section("Supported when"), "{}", protocol.id);
             let names: Vec<&str> = definition.sensitivities.iter().map(|s| s.name).collect();
             assert_eq!(names, protocol.list("Sensitivity conditions"), "{}", protocol.id);
-            let numbers: Vec<&str> = definition.numbers.iter().map(|n| n.name()).collect();
-            assert_eq!(numbers, protocol.list("Numbers of ours, halved and doubled"), "{}", protocol.id);
+            let assumed_values: Vec<&str> = definition.assumed_values.iter().map(|n| n.name()).collect();
+            assert_eq!(
+                assumed_values,
+                protocol.list("Numbers of ours, halved and doubled"),
+                "{}",
+                protocol.id
+            );
             for heading in
                 ["The paper says", "Source", "Primary condition", "Effect", "Assumed", "Untestable"]
             {

@@ -1,6 +1,6 @@
 //! S Figs 10-15: covariance reset only at ruptures, and 40 Hz without re-weighting.
 
-use super::figure::{Draw, Figure};
+use super::figure::{Figure, FigureRecording};
 use super::insertion_panels::{Run, coefficients, force, picture};
 use super::supplement_comparison;
 use crate::algorithm_variant::{Ablation, Sensor, Setup, Variant};
@@ -10,7 +10,7 @@ use crate::run_outcome::Outcome;
 use crate::seed_spread::Spread;
 use crate::simulated_insertion::Insertion;
 use crate::study_conditions::View;
-use crate::value_source::Sourced;
+use crate::value_source::SourcedTable;
 use stylet_report::{Cell, Table, percent, significant};
 use stylet_stats::parallel::*;
 
@@ -36,13 +36,13 @@ const SPECS: [Spec; 6] = {
     ]
 };
 
-const WITHOUT: &str = "40 Hz, no re-weighting";
-const RARELY: &str = "only at ruptures";
+const WITHOUT_REWEIGHTING: &str = "40 Hz, no re-weighting";
+const RESETS_AT_RUPTURES: &str = "only at ruptures";
 
 fn make(study: &Study, spec: &Spec) -> Result<Figure, ReproduceError> {
-    let drawn = Draw::of(study, spec.case, Sensor::ForceTorque)?;
+    let recording = FigureRecording::of(study, spec.case, Sensor::ForceTorque)?;
     let only = spec.ablation == Ablation::OnlyRuptures;
-    let runs = [Run::of(&drawn, Variant::ml(Setup::Tuned).without(spec.ablation))];
+    let runs = [Run::of(&recording, Variant::ml(Setup::Tuned).without(spec.ablation))];
     let (what, says) = if only {
         (
             "covariance reset only at detected ruptures",
@@ -54,30 +54,30 @@ fn make(study: &Study, spec: &Spec) -> Result<Figure, ReproduceError> {
             "The supplement sees the predicted force follow the measured one, and hardly any compensation.",
         )
     };
-    let a = force(&drawn, &runs, !only);
-    let b = coefficients(&drawn.insertion, &runs, !only);
+    let a = force(&recording, &runs, !only);
+    let b = coefficients(&recording.insertion, &runs, !only);
     let mut all = vec![a.clone()];
     all.extend(b.iter().cloned());
-    let subtitle = format!("{what}; noise seed {}, {NOISE_MN} mN", drawn.seed);
+    let subtitle = format!("{what}; noise seed {}, {NOISE_MN} mN", recording.seed);
     Ok(Figure {
         number: spec.number,
         title: format!("{}: {what}", spec.case.name()),
         caption: format!(
             "{says} Multi-layer model, layer depth unknown, s1 {} N and beta {} N/s tuned within the published range. Scenario: scenarios/{}.",
-            drawn.tuning.sigma_rupture_n,
-            drawn.tuning.on_n_per_s,
+            recording.tuning.sigma_rupture_n,
+            recording.tuning.on_n_per_s,
             spec.case.file().0
         ),
         force: Some(a),
         pictures: vec![picture(&b, "", "")],
         files: vec![(
             spec.file,
-            picture(&all, &format!("{}: {}", spec.number, drawn.insertion.scenario.name), &subtitle),
+            picture(&all, &format!("{}: {}", spec.number, recording.insertion.scenario.name), &subtitle),
         )],
         tables: vec![
-            supplement_comparison::listed(statements(study, spec, &drawn.insertion, &runs)),
+            supplement_comparison::statement_table(statements(study, spec, &recording.insertion, &runs)),
             table(study, spec),
-            crate::value_source::table(spec.case, &drawn.insertion.scenario),
+            crate::value_source::table(spec.case, &recording.insertion.scenario),
         ],
     })
 }
@@ -169,11 +169,11 @@ fn statements(study: &Study, spec: &Spec, insertion: &Insertion, runs: &[Run]) -
         "what is not reconstructed or not compensated adds up in the CUSUM, the more the friction outweighs the drops",
     );
     let panels = if spec.ablation == Ablation::OnlyRuptures { "K and b" } else { "K, b and D" };
-    rows.extend(supplement_comparison::looks(runs, panels));
+    rows.extend(supplement_comparison::common_statements(runs, panels));
     rows
 }
 
-fn table(study: &Study, spec: &Spec) -> Sourced {
+fn table(study: &Study, spec: &Spec) -> SourcedTable {
     let row = |name: &str, ablation: Ablation| {
         let runs = View::primary(study).without(spec.case, ablation);
         let show = |s: Option<Spread>| {
@@ -190,7 +190,7 @@ fn table(study: &Study, spec: &Spec) -> Sourced {
             Cell::number(format!("{} of {}", runs.iter().filter(|o| o.found_all()).count(), runs.len())),
         ]
     };
-    Sourced::computed(Table {
+    SourcedTable::computed(Table {
         title: format!("Over {} noise seeds: median (5th to 95th percentile)", study.seeds),
         headers: [
             "",
@@ -202,8 +202,8 @@ fn table(study: &Study, spec: &Spec) -> Sourced {
         .map(String::from)
         .to_vec(),
         rows: vec![
-            row(RARELY, Ablation::OnlyRuptures),
-            row(WITHOUT, Ablation::NoReweight),
+            row(RESETS_AT_RUPTURES, Ablation::OnlyRuptures),
+            row(WITHOUT_REWEIGHTING, Ablation::NoReweight),
             row("40 Hz, with re-weighting", Ablation::None),
         ],
         ..Table::default()
@@ -211,7 +211,7 @@ fn table(study: &Study, spec: &Spec) -> Sourced {
 }
 
 /// Records the runs that the tables need.
-pub(super) fn ask(study: &Study) {
+pub(super) fn request_runs(study: &Study) {
     for spec in &SPECS {
         let _ = table(study, spec);
     }

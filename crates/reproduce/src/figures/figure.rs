@@ -6,7 +6,7 @@ use crate::paper_experiments::Case;
 use crate::simulated_insertion::Insertion;
 use crate::study_conditions::View;
 use crate::tuned_thresholds::Tuning;
-use crate::value_source::Sourced;
+use crate::value_source::SourcedTable;
 use stylet_report::Chart;
 
 /// A reproduced figure of the paper.
@@ -25,11 +25,11 @@ pub struct Figure {
     /// Pictures as files, each complete: name and content.
     pub files: Vec<(&'static str, String)>,
     /// Tables that belong to it.
-    pub tables: Vec<Sourced>,
+    pub tables: Vec<SourcedTable>,
 }
 
 /// The recording that a figure shows: that of the first seed of the study.
-pub(super) struct Draw {
+pub(super) struct FigureRecording {
     pub(super) insertion: Insertion,
     pub(super) force_n: Vec<f64>,
     pub(super) sensor: Sensor,
@@ -37,7 +37,7 @@ pub(super) struct Draw {
     pub(super) tuning: Tuning,
 }
 
-impl Draw {
+impl FigureRecording {
     pub(super) fn of(study: &Study, case: Case, sensor: Sensor) -> Result<Self, ReproduceError> {
         let seed = study.first_seed;
         let insertion = Insertion::of(&case.scenario()?, seed)?;
@@ -45,7 +45,7 @@ impl Draw {
             Sensor::ForceTorque => insertion.reading(seed, NOISE_MN),
             Sensor::Virtual => insertion.force_n(sensor).to_vec(),
         };
-        let tuning = study.tuning(View::primary(study).recorded(case), sensor);
+        let tuning = study.tuning(View::primary(study).recording_key(case), sensor);
         Ok(Self { insertion, force_n, sensor, seed, tuning })
     }
 }

@@ -8,7 +8,7 @@ use crate::friction_estimates::{MOTIONS, Method, PHANTOMS, estimates, over, true
 use crate::paper_experiments::Case;
 use crate::seed_spread::Spread;
 use crate::study_conditions::View;
-use crate::value_source::Sourced;
+use crate::value_source::SourcedTable;
 use stylet_report::svg::{FigureOptions, Strip, StripChart, StripGroup, strip_chart};
 use stylet_report::{Cell, Colour, Status, Table, percent, significant};
 
@@ -30,7 +30,7 @@ fn strip(
     Strip { name: name.to_owned(), colour, values }
 }
 
-fn inputs() -> Sourced {
+fn inputs() -> SourcedTable {
     let cases: Vec<Case> = PHANTOMS.iter().flat_map(|p| p.cases).collect();
     crate::value_source::table_of(&cases)
 }
@@ -152,7 +152,7 @@ pub(super) fn figure(study: &Study) -> Figure {
         force: None,
         pictures: vec![a.clone(), b.clone()],
         files: vec![("figure_s02a.svg", a), ("figure_s02b.svg", b)],
-        tables: vec![supplement_comparison::listed(statements(v)), inputs()],
+        tables: vec![supplement_comparison::statement_table(statements(v)), inputs()],
     }
 }
 
@@ -214,13 +214,13 @@ pub(super) fn table_one(study: &Study) -> Figure {
         pictures: Vec::new(),
         files: Vec::new(),
         tables: vec![
-            supplement_comparison::listed(vec![[
+            supplement_comparison::statement_table(vec![[
                 "average of the four estimates, variance, percentage error".to_owned(),
                 "mean, standard deviation, error against the true b".to_owned(),
                 "the paper's error is against its average, for lack of a truth; its scatter is of real insertions, ours of sensor noise alone"
                     .to_owned(),
             ]]),
-            Sourced::computed(Table {
+            SourcedTable::computed(Table {
                 title: "True b is ours".to_owned(),
                 headers: headers.map(String::from).to_vec(),
                 rows,

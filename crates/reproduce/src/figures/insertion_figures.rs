@@ -1,16 +1,16 @@
 //! S Figs 3-9 and M Figs 12-14: measured, predicted and enhanced force, and the coefficients. Figs 3 to 6 as
 //! captioned, with unknown layer depth, and next to it with known depth.
 
-use super::figure::{Draw, Figure};
-use super::insertion_panels::{Run, coefficients, force, picture, visited};
-use super::supplement_comparison::{self, Facts, Statement};
+use super::figure::{Figure, FigureRecording};
+use super::insertion_panels::{Run, coefficients, force, picture, reached_compensation};
+use super::supplement_comparison::{self, FigureData, Statement};
 use crate::algorithm_variant::{Ablation, Sensor, Setup, Variant};
 use crate::all_runs::{NOISE_MN, ReproduceError, Study};
 use crate::paper_experiments::Case;
 use crate::run_outcome::Outcome;
 use crate::seed_spread::Spread;
 use crate::study_conditions::View;
-use crate::value_source::Sourced;
+use crate::value_source::SourcedTable;
 use stylet_report::{Cell, Table, percent, significant};
 use stylet_stats::parallel::*;
 
@@ -95,33 +95,33 @@ const MAIN: [Spec; 3] = [
 ];
 
 fn make(study: &Study, spec: &Spec) -> Result<Figure, ReproduceError> {
-    let drawn = Draw::of(study, spec.case, spec.sensor)?;
-    let runs = |setup: Setup| [Variant::kv(setup), Variant::ml(setup)].map(|v| Run::of(&drawn, v));
-    let title = |what: &str| format!("{}: {}{what}", spec.number, drawn.insertion.scenario.name);
+    let recording = FigureRecording::of(study, spec.case, spec.sensor)?;
+    let runs = |setup: Setup| [Variant::kv(setup), Variant::ml(setup)].map(|v| Run::of(&recording, v));
+    let title = |what: &str| format!("{}: {}{what}", spec.number, recording.insertion.scenario.name);
     let subtitle = format!(
         "{} sensor, noise seed {}, {NOISE_MN} mN; s1 {} N and beta {} N/s tuned within the published range",
         spec.sensor.name(),
-        drawn.seed,
-        drawn.tuning.sigma_rupture_n,
-        drawn.tuning.on_n_per_s
+        recording.seed,
+        recording.tuning.sigma_rupture_n,
+        recording.tuning.on_n_per_s
     );
     let unknown = runs(Setup::Tuned);
-    let a = force(&drawn, &unknown, true);
-    let b = coefficients(&drawn.insertion, &unknown, true);
+    let a = force(&recording, &unknown, true);
+    let b = coefficients(&recording.insertion, &unknown, true);
     let mut all = vec![a.clone()];
     all.extend(b.iter().cloned());
     let mut files = vec![(spec.file, picture(&all, &title(""), &subtitle))];
     let mut pictures = vec![picture(&b, "", "")];
     if let Some(file) = spec.known {
         let known = runs(Setup::KnownDepth);
-        let mut all = vec![force(&drawn, &known, true)];
-        all.extend(coefficients(&drawn.insertion, &known, true));
+        let mut all = vec![force(&recording, &known, true)];
+        all.extend(coefficients(&recording.insertion, &known, true));
         let svg =
             picture(&all, &title(", surface and depth known"), "the same recording; published defaults");
         pictures.push(svg.clone());
         files.push((file, svg));
     }
-    let nothing = if unknown.iter().any(visited) {
+    let nothing = if unknown.iter().any(reached_compensation) {
         ""
     } else {
         " In this seed nothing is found and nothing compensated."
@@ -133,7 +133,7 @@ fn make(study: &Study, spec: &Spec) -> Result<Figure, ReproduceError> {
     );
     Ok(Figure {
         number: spec.number,
-        title: drawn.insertion.scenario.name.clone(),
+        title: recording.insertion.scenario.name.clone(),
         caption,
         force: Some(a),
         pictures,
@@ -141,16 +141,16 @@ fn make(study: &Study, spec: &Spec) -> Result<Figure, ReproduceError> {
         tables: vec![
             supplement_comparison::table(
                 spec.says,
-                &Facts {
-                    insertion: &drawn.insertion,
-                    measured_n: &drawn.force_n,
+                &FigureData {
+                    insertion: &recording.insertion,
+                    measured_n: &recording.force_n,
                     ml: primary(study, spec, false),
                     kv: primary(study, spec, true),
-                    drawn: &unknown,
+                    shown_runs: &unknown,
                 },
             ),
             numbers(study, spec),
-            crate::value_source::table(spec.case, &drawn.insertion.scenario),
+            crate::value_source::table(spec.case, &recording.insertion.scenario),
         ],
     })
 }
@@ -160,7 +160,7 @@ fn primary<'a>(study: &'a Study, spec: &Spec, kelvin_voigt: bool) -> &'a [Outcom
 }
 
 /// Variation of the figure over all seeds and the laboratory's range of noise.
-fn numbers(study: &Study, spec: &Spec) -> Sourced {
+fn numbers(study: &Study, spec: &Spec) -> SourcedTable {
     let mut rows = Vec::new();
     let setups: &[(Setup, &str)] = if spec.known.is_some() {
         &[(Setup::Tuned, "depth unknown"), (Setup::KnownDepth, "depth known")]
@@ -182,7 +182,7 @@ fn numbers(study: &Study, spec: &Spec) -> Sourced {
                 let runs = view.runs(spec.case, spec.sensor, kelvin_voigt, Ablation::None);
                 let found = runs.iter().filter(|o| o.found_all()).count();
                 let of = |value: &dyn Fn(&Outcome) -> Option<f64>| Spread::of(runs.iter().map(value));
-                let tuning = study.tuning(view.recorded(spec.case), spec.sensor);
+                let tuning = study.tuning(view.recording_key(spec.case), spec.sensor);
                 let model = if kelvin_voigt { "KV" } else { "ML" };
                 let noise = if spec.sensor == Sensor::Virtual {
                     "virtual".to_owned()
@@ -205,7 +205,7 @@ fn numbers(study: &Study, spec: &Spec) -> Sourced {
             }
         }
     }
-    Sourced::computed(Table {
+    SourcedTable::computed(Table {
         title: format!(
             "Over {} noise seeds: median (5th to 95th percentile); noise of 5 to 20 mN is the laboratory's range, 20 mN that of the shipped scenarios",
             study.seeds
@@ -227,7 +227,7 @@ fn numbers(study: &Study, spec: &Spec) -> Sourced {
 }
 
 /// Records the runs that the figures need.
-pub(super) fn ask(study: &Study) {
+pub(super) fn request_runs(study: &Study) {
     for spec in SUPPLEMENT.iter().chain(&MAIN) {
         let _ = numbers(study, spec);
         let _ = (primary(study, spec, false), primary(study, spec, true));

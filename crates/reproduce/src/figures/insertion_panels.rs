@@ -1,6 +1,6 @@
 //! The panels of an insertion: force above, coefficients below, over one time axis.
 
-use super::figure::Draw;
+use super::figure::FigureRecording;
 use crate::algorithm_variant::Variant;
 use crate::simulated_insertion::Insertion;
 use stylet_core::State;
@@ -18,9 +18,10 @@ pub(super) struct Run {
 }
 
 impl Run {
-    pub(super) fn of(drawn: &Draw, variant: Variant) -> Self {
+    pub(super) fn of(recording: &FigureRecording, variant: Variant) -> Self {
         let colour = if variant.kelvin_voigt { Colour::Blue } else { Colour::Vermillion };
-        let trace = drawn.insertion.trace(&drawn.force_n, drawn.sensor, variant, &drawn.tuning);
+        let trace =
+            recording.insertion.trace(&recording.force_n, recording.sensor, variant, &recording.tuning);
         Self { variant, trace, colour }
     }
 
@@ -34,7 +35,7 @@ fn time(insertion: &Insertion) -> Vec<f64> {
 }
 
 /// Continuous black lines: ruptures detected; dashed: compensated.
-fn instants(run: &Run, labels: bool) -> [MarkerSet; 2] {
+fn event_markers(run: &Run, labels: bool) -> [MarkerSet; 2] {
     let label = |text: String| if labels { text } else { String::new() };
     [
         MarkerSet {
@@ -59,14 +60,14 @@ fn instants(run: &Run, labels: bool) -> [MarkerSet; 2] {
     ]
 }
 
-fn with_instants(chart: Chart, run: &Run, labels: bool) -> Chart {
-    let [detected, compensated] = instants(run, labels);
+fn with_event_markers(chart: Chart, run: &Run, labels: bool) -> Chart {
+    let [detected, compensated] = event_markers(run, labels);
     chart.with_markers(detected).with_markers(compensated)
 }
 
 /// Measured (green), predicted, and the force enhanced by every run; markers of the last run.
-pub(super) fn force(drawn: &Draw, runs: &[Run], enhanced: bool) -> Chart {
-    let insertion = &drawn.insertion;
+pub(super) fn force(recording: &FigureRecording, runs: &[Run], enhanced: bool) -> Chart {
+    let insertion = &recording.insertion;
     let t = time(insertion);
     let mut chart = Chart::new("(a) Force", TIME, "Force (N)").height(330);
     if let Some(run) = runs.last() {
@@ -81,7 +82,7 @@ pub(super) fn force(drawn: &Draw, runs: &[Run], enhanced: bool) -> Chart {
             .with_series(Series::line(name, run.colour, t.clone(), run.trace.enhanced_n.clone()).width(1.3));
     }
     // Drawn last: the enhanced force equals the measured one until friction is compensated.
-    let measured = drawn.force_n.clone();
+    let measured = recording.force_n.clone();
     chart = chart.with_series(Series::line("measured", Colour::Green, t.clone(), measured).width(1.0));
     if enhanced {
         let truth = insertion.simulation.truth.tip_force_n.clone();
@@ -90,7 +91,7 @@ pub(super) fn force(drawn: &Draw, runs: &[Run], enhanced: bool) -> Chart {
         );
     }
     match runs.last() {
-        Some(run) => with_instants(chart, run, true),
+        Some(run) => with_event_markers(chart, run, true),
         None => chart,
     }
 }
@@ -110,7 +111,7 @@ fn spans(insertion: &Insertion) -> Vec<(f64, f64, usize)> {
 }
 
 /// A value per span, constant over it and followed by a gap.
-fn held(spans: impl Iterator<Item = (f64, f64, f64)>) -> (Vec<f64>, Vec<f64>) {
+fn piecewise_constant(spans: impl Iterator<Item = (f64, f64, f64)>) -> (Vec<f64>, Vec<f64>) {
     let (mut x, mut y) = (Vec::new(), Vec::new());
     for (from, to, value) in spans {
         x.extend([from, to, to]);
@@ -120,14 +121,14 @@ fn held(spans: impl Iterator<Item = (f64, f64, f64)>) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// The a posteriori estimates of a run, each over the time in which its layer was traversed.
-fn afterwards(
+fn a_posteriori(
     insertion: &Insertion,
     run: &Run,
     value: impl Fn(&stylet_core::LayerEstimate) -> f64,
 ) -> (Vec<f64>, Vec<f64>) {
     let contact = run.trace.contact_s.or(insertion.simulation.truth.surface_contact_s).unwrap_or(0.0);
     let ends: Vec<f64> = run.trace.detections.iter().map(|d| d.time_s).collect();
-    held(run.trace.estimates.iter().filter_map(|e| {
+    piecewise_constant(run.trace.estimates.iter().filter_map(|e| {
         let end = *ends.get(e.layer.checked_sub(1)?)?;
         let start = if e.layer == 1 { contact } else { ends.get(e.layer - 2).copied().unwrap_or(contact) };
         Some((start, end, value(e)))
@@ -135,8 +136,9 @@ fn afterwards(
 }
 
 fn truth_line(insertion: &Insertion, value: impl Fn(&stylet_score::LayerTruth) -> f64) -> Series {
-    let (x, y) =
-        held(spans(insertion).into_iter().map(|(from, to, i)| (from, to, value(&insertion.layers[i]))));
+    let (x, y) = piecewise_constant(
+        spans(insertion).into_iter().map(|(from, to, i)| (from, to, value(&insertion.layers[i]))),
+    );
     Series::line("true", Colour::Ink, x, y).styled(LineStyle::Dashed).width(1.6)
 }
 
@@ -169,7 +171,7 @@ fn coefficient(
             column(&run.trace).clone(),
         )
         .width(0.8);
-        let (x, y) = afterwards(insertion, run, &estimate);
+        let (x, y) = a_posteriori(insertion, run, &estimate);
         kept.push(Series::line(format!("{} a posteriori", run.name()), run.colour, x, y).width(3.2));
         high = high.max(range(&kept, &online, !run.trace.estimates.is_empty()).1);
         chart = chart.with_series(online);
@@ -179,7 +181,7 @@ fn coefficient(
     }
     chart.y_range = Some((0.0, high));
     match runs.last() {
-        Some(run) => with_instants(chart, run, false),
+        Some(run) => with_event_markers(chart, run, false),
         None => chart,
     }
 }
@@ -227,7 +229,7 @@ pub(super) fn coefficients(insertion: &Insertion, runs: &[Run], cumulative: bool
         chart = chart
             .with_series(Series::line("true", Colour::Ink, t, truth).styled(LineStyle::Dashed).width(1.6));
         charts.push(match runs.last() {
-            Some(run) => with_instants(chart, run, false),
+            Some(run) => with_event_markers(chart, run, false),
             None => chart,
         });
     }
@@ -243,6 +245,6 @@ pub(super) fn picture(charts: &[Chart], title: &str, subtitle: &str) -> String {
 }
 
 /// The states in the order in which they were visited, for the caption.
-pub(super) fn visited(run: &Run) -> bool {
+pub(super) fn reached_compensation(run: &Run) -> bool {
     run.trace.state.contains(&State::ForceCompensation)
 }

@@ -13,9 +13,9 @@ pub use figure::Figure;
 use crate::all_runs::{ReproduceError, Study};
 
 /// Requests all runs that the figures use.
-pub fn ask(study: &Study) {
-    insertion_figures::ask(study);
-    ablation_figures::ask(study);
+pub fn request_runs(study: &Study) {
+    insertion_figures::request_runs(study);
+    ablation_figures::request_runs(study);
     let _ = (friction_figures::figure(study), friction_figures::table_one(study));
 }
 

@@ -2,7 +2,7 @@
 
 use super::figure::Figure;
 use super::supplement_comparison;
-use crate::value_source::{Class, Sourced};
+use crate::value_source::{Class, SourcedTable};
 use stylet_core::config::DerivativeSense;
 use stylet_core::{EnhanceConfig, State, TRANSITIONS};
 use stylet_report::svg::{Arrow, Diagram, FigureOptions, Node, state_machine};
@@ -117,8 +117,8 @@ pub(super) fn figure() -> Figure {
         pictures: vec![svg.clone()],
         files: vec![("figure_s01.svg", svg)],
         tables: vec![
-            supplement_comparison::listed(statements()),
-            Sourced::named(Table {
+            supplement_comparison::statement_table(statements()),
+            SourcedTable::named(Table {
                 headers: ["from", "to", "when", "whose"].map(String::from).to_vec(),
                 rows,
                 ..Table::default()

@@ -4,17 +4,17 @@ use super::insertion_panels::Run;
 use crate::run_outcome::Outcome;
 use crate::seed_spread::Spread;
 use crate::simulated_insertion::Insertion;
-use crate::value_source::Sourced;
+use crate::value_source::SourcedTable;
 use stylet_report::{Cell, Table, percent, significant};
 
 /// Data of a figure.
-pub(super) struct Facts<'a> {
+pub(super) struct FigureData<'a> {
     pub insertion: &'a Insertion,
     pub measured_n: &'a [f64],
     pub ml: &'a [Outcome],
     pub kv: &'a [Outcome],
     /// The seed that is drawn, model by model.
-    pub drawn: &'a [Run],
+    pub shown_runs: &'a [Run],
 }
 
 /// A statement of the supplement about a figure.
@@ -22,17 +22,17 @@ pub(super) struct Statement {
     /// The supplement's statement.
     says: &'static str,
     /// The result here.
-    here: fn(&Facts<'_>) -> String,
+    here: fn(&FigureData<'_>) -> String,
     /// Reason of the difference.
     why: &'static str,
 }
 
-const fn statement(says: &'static str, here: fn(&Facts<'_>) -> String, why: &'static str) -> Statement {
+const fn statement(says: &'static str, here: fn(&FigureData<'_>) -> String, why: &'static str) -> Statement {
     Statement { says, here, why }
 }
 
-fn exit(facts: &Facts<'_>) -> String {
-    let truth = &facts.insertion.simulation.truth;
+fn exit(data: &FigureData<'_>) -> String {
+    let truth = &data.insertion.simulation.truth;
     match (truth.surface_contact_s, truth.ruptures.last()) {
         (Some(contact), Some(exit)) => format!(
             "{} s after contact, at {} s of the recording",
@@ -43,63 +43,63 @@ fn exit(facts: &Facts<'_>) -> String {
     }
 }
 
-fn peak(facts: &Facts<'_>) -> String {
-    let peak = facts.measured_n.iter().copied().filter(|f| f.is_finite()).fold(0.0, f64::max);
+fn peak(data: &FigureData<'_>) -> String {
+    let peak = data.measured_n.iter().copied().filter(|f| f.is_finite()).fold(0.0, f64::max);
     format!("at most {} N", significant(peak, 3))
 }
 
-fn found(facts: &Facts<'_>) -> String {
+fn found(data: &FigureData<'_>) -> String {
     let of =
         |runs: &[Outcome]| format!("{} of {}", runs.iter().filter(|o| o.found_all()).count(), runs.len());
-    format!("exactly the true ruptures in {} seeds (ML), {} (KV)", of(facts.ml), of(facts.kv))
+    format!("exactly the true ruptures in {} seeds (ML), {} (KV)", of(data.ml), of(data.kv))
 }
 
 fn median(runs: &[Outcome], value: fn(&Outcome) -> Option<f64>) -> Option<f64> {
     Spread::of(runs.iter().map(value)).map(|s| s.median)
 }
 
-fn pair(facts: &Facts<'_>, value: fn(&Outcome) -> Option<f64>, text: fn(f64) -> String) -> String {
+fn pair(data: &FigureData<'_>, value: fn(&Outcome) -> Option<f64>, text: fn(f64) -> String) -> String {
     let of = |runs| median(runs, value).map_or("–".to_owned(), text);
-    format!("ML {}, KV {} (medians)", of(facts.ml), of(facts.kv))
+    format!("ML {}, KV {} (medians)", of(data.ml), of(data.kv))
 }
 
-fn left(facts: &Facts<'_>) -> String {
-    format!("left of the force: {}", pair(facts, |o| o.after_exit, percent))
+fn after_exit(data: &FigureData<'_>) -> String {
+    format!("left of the force: {}", pair(data, |o| o.after_exit, percent))
 }
 
-fn cumulative(facts: &Facts<'_>) -> String {
-    format!("D / true D: {}", pair(facts, |o| o.cumulative_ratio, |x| significant(x, 3)))
+fn cumulative(data: &FigureData<'_>) -> String {
+    format!("D / true D: {}", pair(data, |o| o.cumulative_ratio, |x| significant(x, 3)))
 }
 
-fn elastic(facts: &Facts<'_>) -> String {
-    format!("off the elastic part by {}", pair(facts, |o| o.elastic_error, percent))
+fn elastic(data: &FigureData<'_>) -> String {
+    format!("off the elastic part by {}", pair(data, |o| o.elastic_error, percent))
 }
 
-fn layers(facts: &Facts<'_>) -> String {
-    let names: Vec<&str> = facts.insertion.scenario.tissue.layers.iter().map(|l| l.name.as_str()).collect();
+fn layers(data: &FigureData<'_>) -> String {
+    let names: Vec<&str> = data.insertion.scenario.tissue.layers.iter().map(|l| l.name.as_str()).collect();
     names.join(", ")
 }
 
-const EXIT_WHY: &str =
-    "how large the drop at the exit is follows from K, which is ours: see claim c1's numbers of ours";
-const TIME_WHY: &str = "our recording begins with 5 mm of air; thickness from this very time";
-const LEFT_WHY: &str =
+const EXIT_REASON: &str =
+    "how large the drop at the exit is follows from K, which is ours: see the assumed values of claim c1";
+const TIME_REASON: &str = "our recording begins with 5 mm of air; thickness from this very time";
+const AFTER_EXIT_REASON: &str =
     "here noise and the error of b are all that can stay; real friction is not purely viscous";
 
 pub(super) const FIG_3: &[Statement] = &[
-    statement("the tip exits at t = 12.5 s", exit, TIME_WHY),
+    statement("the tip exits at t = 12.5 s", exit, TIME_REASON),
     statement("the range of the force is 0.5 N", peak, "b was chosen for it"),
-    statement("the exit is marked as detected", found, EXIT_WHY),
-    statement("ML is closer to zero behind the gel than KV", left, "see claim c1"),
-    statement("the compensated force does not vanish completely", left, LEFT_WHY),
+    statement("the exit is marked as detected", found, EXIT_REASON),
+    statement("ML is closer to zero behind the gel than KV", after_exit, "see claim c1"),
+    statement("the compensated force does not vanish completely", after_exit, AFTER_EXIT_REASON),
 ];
 pub(super) const FIG_4: &[Statement] = &[
-    statement("the tip exits at t = 17 s", exit, TIME_WHY),
-    statement("the exit is marked as detected", found, EXIT_WHY),
-    statement("again ML is more effective behind the gel", left, "see claim c1"),
+    statement("the tip exits at t = 17 s", exit, TIME_REASON),
+    statement("the exit is marked as detected", found, EXIT_REASON),
+    statement("again ML is more effective behind the gel", after_exit, "see claim c1"),
 ];
 pub(super) const FIG_5: &[Statement] = &[
-    statement("the exit is marked as detected", found, EXIT_WHY),
+    statement("the exit is marked as detected", found, EXIT_REASON),
     statement(
         "KV over-compensates",
         cumulative,
@@ -112,8 +112,8 @@ pub(super) const FIG_5: &[Statement] = &[
     ),
 ];
 pub(super) const FIG_6: &[Statement] = &[
-    statement("the exit is marked as detected", found, EXIT_WHY),
-    statement("no comparison given", left, "see claim c1, sensitivity to sinusoidal velocity"),
+    statement("the exit is marked as detected", found, EXIT_REASON),
+    statement("no comparison given", after_exit, "see claim c1, sensitivity to sinusoidal velocity"),
 ];
 pub(super) const FIG_7: &[Statement] = &[
     statement("three ruptures correctly detected", found, "drops of 1.1 to 2.6 N are ours: see claim e"),
@@ -131,7 +131,7 @@ pub(super) const FIG_8: &[Statement] = &[
 pub(super) const FIG_9: &[Statement] = &[statement("two ruptures correctly detected", found, "see claim f1")];
 pub(super) const MAIN_12: &[Statement] = &[
     statement("three ruptures at constant velocity", found, "see claim e"),
-    statement("no number given", left, LEFT_WHY),
+    statement("no number given", after_exit, AFTER_EXIT_REASON),
 ];
 pub(super) const MAIN_13: &[Statement] = &[
     statement(
@@ -162,7 +162,7 @@ fn declared(runs: &[Run]) -> String {
 }
 
 /// Statements checked for every figure of an insertion.
-pub(super) fn looks(runs: &[Run], panels: &str) -> Vec<[String; 3]> {
+pub(super) fn common_statements(runs: &[Run], panels: &str) -> Vec<[String; 3]> {
     [
         (
             "(b) shows the elastic, the local friction and the cumulative friction coefficients",
@@ -180,8 +180,8 @@ pub(super) fn looks(runs: &[Run], panels: &str) -> Vec<[String; 3]> {
 }
 
 /// The table of a figure, with rows of supplement's statement, result here, reason of the difference.
-pub(super) fn listed(rows: Vec<[String; 3]>) -> Sourced {
-    Sourced::named(Table {
+pub(super) fn statement_table(rows: Vec<[String; 3]>) -> SourcedTable {
+    SourcedTable::named(Table {
         title: "Compared with the supplement".to_owned(),
         headers: ["the supplement says (the paper's)", "here (computed)", "what differs, and why (ours)"]
             .map(String::from)
@@ -192,8 +192,8 @@ pub(super) fn listed(rows: Vec<[String; 3]>) -> Sourced {
 }
 
 /// The table of a figure of an insertion.
-pub(super) fn table(statements: &[Statement], facts: &Facts<'_>) -> Sourced {
-    let said = statements.iter().map(|s| [s.says.to_owned(), (s.here)(facts), s.why.to_owned()]);
+pub(super) fn table(statements: &[Statement], data: &FigureData<'_>) -> SourcedTable {
+    let said = statements.iter().map(|s| [s.says.to_owned(), (s.here)(data), s.why.to_owned()]);
     let panels = "K, b of ML, b of KV, D";
-    listed(said.chain(looks(facts.drawn, panels)).collect())
+    statement_table(said.chain(common_statements(data.shown_runs, panels)).collect())
 }

@@ -18,7 +18,7 @@ fn insertion<Body: ArmBody>(scenario: &Scenario) -> Vec<(ArmStep, f64)> {
     let law = ForceLaw::new(&scenario.tissue, &scenario.effects).expect("a law");
     let dt_s = 1e-3;
     let mut state = ForceLawState::default();
-    let mut rig: ArmSimulation<Body> = ArmSimulation::new(
+    let mut simulation: ArmSimulation<Body> = ArmSimulation::new(
         config,
         Some(virtual_sensor),
         &line,
@@ -37,7 +37,7 @@ fn insertion<Body: ArmBody>(scenario: &Scenario) -> Vec<(ArmStep, f64)> {
                 force_n = law.step(&mut state, time_s, z, v, |_| {}).total_n;
                 force_n
             };
-            let step = rig.step(&plan.at(time_s), true, tissue).expect("within the limits");
+            let step = simulation.step(&plan.at(time_s), true, tissue).expect("within the limits");
             (step, force_n)
         })
         .collect()

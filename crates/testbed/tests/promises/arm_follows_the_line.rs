@@ -43,7 +43,7 @@ fn a_slanted_line_is_followed_as_well() {
 }
 
 #[test]
-fn without_the_disturbance_observer_the_tip_stands_back_under_the_force() {
+fn without_the_disturbance_observer_the_force_displaces_the_tip() {
     let controller = ArmController { disturbance_gain_per_s: 0.0, ..ArmController::default() };
     let (rms, _, _) = tracking(FILES[0], ArmConfig { controller, ..ArmConfig::default() });
     println!("without feed-forward: {:.0} um rms", rms * 1e6);

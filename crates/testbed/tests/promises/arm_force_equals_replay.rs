@@ -21,20 +21,21 @@ fn the_law_replayed_on_the_arms_motion_gives_the_arms_force() {
     let config = ArmConfig::default();
     let line = config.insertion_line(&plan, 0.0, 200.0, None).expect("reachable");
     let first = plan.at(0.0);
-    let mut rig: ArmSimulation =
+    let mut simulation: ArmSimulation =
         ArmSimulation::new(&config, None, &line, &first, first.position_m, 1e-3, 1).expect("an arm");
 
     let (mut state, mut ruptures) = (ForceLawState::default(), 0);
     let (mut motion, mut forces): (Vec<_>, Vec<TissueForce>) = (Vec::new(), Vec::new());
     for k in 0..4000 {
         let t = f64::from(k) * 1e-3;
-        rig.step(&plan.at(t), false, |z, v| {
-            let force = law.step(&mut state, t, z, v, |_| ruptures += 1);
-            motion.push((t, z, v));
-            forces.push(force);
-            force.total_n
-        })
-        .expect("on its line");
+        simulation
+            .step(&plan.at(t), false, |z, v| {
+                let force = law.step(&mut state, t, z, v, |_| ruptures += 1);
+                motion.push((t, z, v));
+                forces.push(force);
+                force.total_n
+            })
+            .expect("on its line");
     }
     assert_eq!(ruptures, 2, "the run must really have had its ruptures");
     let mut replayed = Vec::new();

@@ -141,7 +141,7 @@ fn the_drive_force_is_the_tissue_force_plus_mass_times_acceleration() {
 }
 
 #[test]
-fn position_velocity_and_acceleration_of_a_sample_belong_to_one_instant() {
+fn position_velocity_and_acceleration_of_a_sample_belong_to_the_same_time() {
     let program = Motion::Program {
         start_m: -0.005,
         segments: vec![

@@ -63,7 +63,7 @@ fn a_search_evaluates_both_sides_of_a_dead_band_edge_before_crossing_it() {
             assert_eq!(step.limit_to_dead_band_edge(side * 0.01, target), side * SLIDING_MPS);
             assert_eq!(step.limit_to_dead_band_edge(side * SLIDING_MPS, target), side * edge);
         }
-        // From inside to the outside the other way round.
+        // The reverse, from inside to outside.
         assert_eq!(step.limit_to_dead_band_edge(0.3 * edge, side * 0.01), side * edge);
         assert_eq!(step.limit_to_dead_band_edge(side * edge, side * 0.01), side * SLIDING_MPS);
         assert!(sgn(side * edge) == 0.0 && sgn(side * SLIDING_MPS) == side);

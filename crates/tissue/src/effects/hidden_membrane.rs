@@ -1,4 +1,4 @@
-use super::parameters::Described;
+use super::parameters::ParameterVector;
 use crate::chain_stage::ChainStage;
 use crate::effect::{Effect, EffectState, InsertionState, TipState};
 use crate::effect_info::{EffectInfo, ParameterInfo, Proposal};
@@ -47,7 +47,7 @@ static INFO: EffectInfo = EffectInfo {
     ..EffectInfo::DEFAULTS
 };
 
-impl Described for HiddenMembrane {
+impl ParameterVector for HiddenMembrane {
     fn values(&self) -> alloc::vec::Vec<f64> {
         alloc::vec![self.depth_m, self.stiffness_n_per_m, self.puncture_n]
     }

@@ -7,7 +7,7 @@ use crate::effect::{BaseMotion, Effect, EffectState, InsertionState, TipState};
 use crate::effect_info::{EffectInfo, ParameterError};
 use crate::layer_geometry::Slab;
 use alloc::vec::Vec;
-use parameters::Described;
+use parameters::ParameterVector;
 
 #[macro_use]
 mod parameters;

@@ -5,11 +5,11 @@ use crate::effect_info::{EffectInfo, ParameterError, ParameterInfo};
 use crate::layer_geometry::Slab;
 use alloc::vec::Vec;
 
-/// Implements [`Described`] for an effect whose parameters are its `f64` fields in order, with a leading 1-based layer
+/// Implements [`ParameterVector`] for an effect whose parameters are its `f64` fields in order, with a leading 1-based layer
 /// index where one is named.
 macro_rules! described {
     ($name:ident { $($field:ident),* }) => {
-        impl super::parameters::Described for $name {
+        impl super::parameters::ParameterVector for $name {
             fn values(&self) -> alloc::vec::Vec<f64> {
                 alloc::vec![$(self.$field),*]
             }
@@ -20,7 +20,7 @@ macro_rules! described {
         }
     };
     ($name:ident { layer; $($field:ident),* }) => {
-        impl super::parameters::Described for $name {
+        impl super::parameters::ParameterVector for $name {
             fn values(&self) -> alloc::vec::Vec<f64> {
                 alloc::vec![self.layer as f64, $(self.$field),*]
             }
@@ -50,7 +50,7 @@ pub(super) fn layer_mut(slabs: &mut [Slab], layer: usize) -> Option<&mut Slab> {
 }
 
 /// An effect's parameters as a vector.
-pub(super) trait Described: Effect + Default {
+pub(super) trait ParameterVector: Effect + Default {
     /// The library's entry.
     fn entry() -> &'static EffectInfo {
         Self::default().info()

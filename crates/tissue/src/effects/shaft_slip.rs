@@ -1,4 +1,4 @@
-use super::parameters::{Described, LAYER, layer_mut};
+use super::parameters::{LAYER, ParameterVector, layer_mut};
 use crate::chain_stage::ChainStage;
 use crate::effect::{Effect, EffectState, TipState, lag_weights, sgn};
 use crate::effect_info::{EffectInfo, ParameterError, ParameterInfo};
@@ -141,7 +141,7 @@ static INFO: EffectInfo = EffectInfo {
     ..EffectInfo::DEFAULTS
 };
 
-impl Described for ShaftSlip {
+impl ParameterVector for ShaftSlip {
     fn values(&self) -> alloc::vec::Vec<f64> {
         let ([g1, g2], [t1, t2]) = (self.fractions, self.time_constants_s);
         alloc::vec![
@@ -252,7 +252,7 @@ impl Contact {
         let [w_m, q1, q2, spring_n, slipped_m, fall_n, ruptured, speed_mps] = *state;
         Self { w_m, q_n: [q1, q2], spring_n, slipped_m, fall_n, ruptured: ruptured != 0.0, speed_mps }
     }
-    fn keep(self, state: &mut EffectState) {
+    fn store(self, state: &mut EffectState) {
         *state = self.state();
     }
     fn state(self) -> EffectState {
@@ -307,7 +307,7 @@ impl ShaftSlip {
     }
 
     /// One implicit step after the rupture.
-    fn drag(&self, c: &mut Contact, spring: Spring, dt_s: f64, dz_m: f64, weights: [(f64, f64); 2]) {
+    fn implicit_step(&self, c: &mut Contact, spring: Spring, dt_s: f64, dz_m: f64, weights: [(f64, f64); 2]) {
         let speed_factor = self.speed_factor(c.speed_mps);
         let push = (self.push_n * speed_factor * (1.0 - self.wear_per_m * c.slipped_m).max(MIN_HOLD_SHARE))
             .max(MIN_HOLD_N);
@@ -383,14 +383,14 @@ impl Effect for ShaftSlip {
             c.q_n = self.relaxed(c.q_n, self.weights(dt_s), c.spring_n, elastic_n);
         }
         c.spring_n = elastic_n;
-        c.keep(state);
+        c.store(state);
         elastic_n - c.q_n[0] - c.q_n[1]
     }
     fn on_layer_rupture(&self, layer: usize, released_n: f64, state: &mut EffectState) {
         if layer == self.layer {
             let c = Contact::of(state);
             let fall_n = released_n.min(self.retained_share * self.push_n * self.speed_factor(c.speed_mps));
-            Contact { fall_n, ruptured: true, slipped_m: 0.0, ..c }.keep(state);
+            Contact { fall_n, ruptured: true, slipped_m: 0.0, ..c }.store(state);
         }
     }
     fn layer_friction(
@@ -423,10 +423,10 @@ impl Effect for ShaftSlip {
             let (dt, dz) = (tip.dt_s / steps, tip.dz_m / steps);
             let weights = self.weights(dt);
             for _ in 0..steps as usize {
-                self.drag(&mut c, spring, dt, dz, weights);
+                self.implicit_step(&mut c, spring, dt, dz, weights);
             }
         }
-        c.keep(state);
+        c.store(state);
         held * (c.spring_n - c.q_n[0] - c.q_n[1])
     }
 }

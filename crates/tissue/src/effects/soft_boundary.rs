@@ -47,7 +47,7 @@ impl Effect for SoftBoundary {
         // The newest release comes first; a fourth one, with three layers inside one width, includes the rest of the
         // oldest.
         let deepest = state[0].max(z_m);
-        let oldest = self.rest(state[5], state[6], deepest);
+        let oldest = self.remaining_force(state[5], state[6], deepest);
         state[0] = if state[7] == 0.0 { z_m } else { deepest };
         state[7] = 1.0;
         state.copy_within(1..5, 3);
@@ -62,13 +62,15 @@ impl Effect for SoftBoundary {
             state[0] = tip.z_m;
         }
         let [deepest, r1, z1, r2, z2, r3, z3, _] = *state;
-        self.rest(r1, z1, deepest) + self.rest(r2, z2, deepest) + self.rest(r3, z3, deepest)
+        self.remaining_force(r1, z1, deepest)
+            + self.remaining_force(r2, z2, deepest)
+            + self.remaining_force(r3, z3, deepest)
     }
 }
 
 impl SoftBoundary {
     /// Remaining force of a release of `force_n` at `at_m` with the deepest tip position `deepest_m`.
-    fn rest(&self, force_n: f64, at_m: f64, deepest_m: f64) -> f64 {
+    fn remaining_force(&self, force_n: f64, at_m: f64, deepest_m: f64) -> f64 {
         if force_n == 0.0 {
             return 0.0;
         }

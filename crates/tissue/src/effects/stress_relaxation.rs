@@ -1,4 +1,4 @@
-use super::parameters::Described;
+use super::parameters::ParameterVector;
 use crate::chain_stage::ChainStage;
 use crate::effect::{Effect, EffectState, TipState, lag_weights, same_step};
 use crate::effect_info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
@@ -80,7 +80,7 @@ static ONE_TERM: EffectInfo = EffectInfo { extended: Some(&TWO_TERMS), ..ONE };
 /// Index of the second share among the parameters.
 const SECOND: usize = 2;
 
-impl Described for StressRelaxation {
+impl ParameterVector for StressRelaxation {
     fn values(&self) -> Vec<f64> {
         self.terms.iter().flat_map(|term| [term.fraction, term.time_constant_s]).collect()
     }

@@ -1,4 +1,4 @@
-use super::parameters::Described;
+use super::parameters::ParameterVector;
 use crate::chain_stage::ChainStage;
 use crate::effect::{Effect, EffectState, InsertionState, TipState, sgn};
 use crate::effect_info::{EffectInfo, ParameterError, ParameterInfo, Proposal};
@@ -61,7 +61,7 @@ static INFO: EffectInfo = EffectInfo {
     ..EffectInfo::DEFAULTS
 };
 
-impl Described for StribeckFriction {
+impl ParameterVector for StribeckFriction {
     fn values(&self) -> alloc::vec::Vec<f64> {
         alloc::vec![self.c_n_per_m, self.c_static_n_per_m, self.v_stribeck_mps]
     }

@@ -64,7 +64,7 @@ fn assert_near(found: &BaselineFit, (x, p): ([f64; 3], [[f64; 3]; 3])) {
 }
 
 #[test]
-fn level_drift_and_line_are_the_least_squares_estimate_with_a_prior_of_the_whole_change() {
+fn level_drift_and_line_are_the_least_squares_estimate_with_a_prior_of_the_total_change() {
     for excess in [1.0, 2.5] {
         let (history, evidence) = history(excess);
         for (tf, zf) in [(2e3, 6.0), (-2e3, 6.0), (900.0, -7.0)] {
@@ -201,8 +201,8 @@ fn behind_a_step_the_level_is_known_from_the_samples_since() {
         let independent = evidence.step.sums.n / evidence.sample_weight;
         near(independent, 6.0);
         near(fit.p[0][0], evidence.excess / evidence.step.sums.n);
-        let quiet = drifting(|_| size_n);
-        let expected = quiet.quiet_fit(&quiet.evaluate(), &now);
+        let no_event = drifting(|_| size_n);
+        let expected = no_event.fit_all_blocks(&no_event.evaluate(), &now);
         assert!(
             (fit.x[0] - expected.x[0]).abs() < 4.0 * fit.p[0][0].sqrt(),
             "{} for {}",
@@ -214,14 +214,14 @@ fn behind_a_step_the_level_is_known_from_the_samples_since() {
 }
 
 #[test]
-fn before_a_bend_the_baseline_is_that_of_air_and_named_only_if_sure() {
+fn before_a_bend_the_baseline_is_that_of_air_and_named_only_if_significant() {
     let history = drifting(|k| 0.01 * f64::from((k - 360).max(0)));
     let evidence = history.evaluate();
     assert!(evidence.contact_nats() > DECISION_NATS && evidence.bend.form != Form::Constant);
     let now = at(1.995, -0.006);
     let fit = history.fit_before_bend(&evidence, &now);
     let air = drifting(|_| 0.0);
-    let expected = air.quiet_fit(&air.evaluate(), &now);
+    let expected = air.fit_all_blocks(&air.evaluate(), &now);
     assert!((fit.x[0] - expected.x[0]).abs() < 0.01, "{} for {}", fit.x[0], expected.x[0]);
     assert!(fit.kind != BaselineKind::Constant && (340.0..=365.0).contains(&fit.samples), "{fit:?}");
     for (nats, named) in [(1.9, false), (2.1, true)] {

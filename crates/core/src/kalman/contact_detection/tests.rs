@@ -36,7 +36,7 @@ fn the_force_is_low_passed_from_the_first_sample_on() {
 fn touched(sd: f64) -> KalmanEnhancer {
     let mut stylet = inside();
     (stylet.steady_drive_mps, stylet.estimator.layer_confirmed) = (0.002, false);
-    stylet.estimator.belief.p[K][K] = sd * sd / stylet.noise.variance;
+    stylet.estimator.state.p[K][K] = sd * sd / stylet.noise.variance;
     stylet
 }
 
@@ -70,8 +70,8 @@ fn where_a_flat_force_begins_to_rise_the_tissue_begins() {
     );
     assert_eq!((stylet.misfit, stylet.estimator.passed_count), (FAILED_MISFIT, 0));
     // Initial force: the predictor's level above the bias, 1.43 N, as uncertain as itself, half of it elastic.
-    near(stylet.estimator.belief.x[D], 0.5 * 1.43);
-    near((stylet.estimator.belief.p[D][D] * stylet.noise.variance).sqrt(), 1.43 + 0.06);
+    near(stylet.estimator.state.x[D], 0.5 * 1.43);
+    near((stylet.estimator.state.p[D][D] * stylet.noise.variance).sqrt(), 1.43 + 0.06);
 }
 
 /// Standard deviation of the low-passed force about the bias.
@@ -198,8 +198,8 @@ fn a_known_surface_defines_the_contact() {
         look(&mut touched, &config, &sample(position_m, 0.6));
         assert!(touched.in_tissue);
         assert_eq!((touched.estimator.start_m, touched.contact_sample_m), (0.004, position_m));
-        assert_eq!((touched.estimator.belief.x[D], touched.output.contact_m), (0.0, Some(0.004)));
-        assert!(touched.estimator.belief.p[D][D] < 1e-12);
+        assert_eq!((touched.estimator.state.x[D], touched.output.contact_m), (0.0, Some(0.004)));
+        assert!(touched.estimator.state.p[D][D] < 1e-12);
     }
     // With detection the known surface has no effect.
     let config = EnhanceConfig::default();
@@ -213,14 +213,14 @@ fn contact_sets_wide_priors_and_the_thresholds_for_the_sampling_rate() {
     let mut stylet = air(NoiseEstimator::known(0.0, 4e-4, 0.07, 400.0), 0.5);
     stylet.noise.interval_s = 0.001;
     stylet.start_contact(&EnhanceConfig::default(), &step(), &sample(0.006, 0.6), 0.0055, 0.2, 0.3);
-    near(stylet.estimator.belief.x[K], 1000.0);
-    near((stylet.estimator.belief.p[K][K] * 4e-4).sqrt(), 2000.0);
+    near(stylet.estimator.state.x[K], 1000.0);
+    near((stylet.estimator.state.p[K][K] * 4e-4).sqrt(), 2000.0);
     assert_eq!(
         (stylet.predictor.level_n(), stylet.snapshot.start_m, stylet.snapshot_m),
         (0.6, 0.0055, 0.006)
     );
     // 2 N over a millimetre, in half a second at 2 mm/s, or as friction.
-    let p = &stylet.predictor.belief.p;
+    let p = &stylet.predictor.state.p;
     near((p[2][2] * 4e-4).sqrt(), 2000.0);
     near((p[1][1] * 4e-4).sqrt(), 4.0);
     near((p[3][3] * 4e-4).sqrt(), 1000.0);
@@ -232,5 +232,5 @@ fn contact_sets_wide_priors_and_the_thresholds_for_the_sampling_rate() {
     let mut stylet = inside();
     stylet.steady_drive_mps = 0.0;
     stylet.start_contact(&EnhanceConfig::default(), &step(), &sample(0.006, 0.6), 0.0055, 0.2, 0.3);
-    near(stylet.estimator.belief.x[2], 1000.0 / 1e-6);
+    near(stylet.estimator.state.x[2], 1000.0 / 1e-6);
 }

@@ -26,7 +26,7 @@ fn behind_a_rupture(stiffness: f64, friction: f64) -> (LayerEstimator, NoiseEsti
 
 /// Log density of `(K, b - b')` or `(K, b)` by its definition.
 fn log_density(estimator: &LayerEstimator, follows: bool, noise: &NoiseEstimator) -> f64 {
-    let g = &estimator.belief;
+    let g = &estimator.state;
     let map = [[(K, 1.0), (K, 0.0)], [(B, 1.0), (B_PREV, if follows { -1.0 } else { 0.0 })]];
     let mean = map.map(|row| row.iter().map(|(i, w)| w * g.x[*i]).sum::<f64>());
     let cov = |a: usize, b: usize| -> f64 {
@@ -59,11 +59,11 @@ fn the_bayes_factor_of_a_free_tip_is_a_ratio_of_densities() {
 fn a_free_tip_is_detected_with_growing_and_constant_friction() {
     let (mut gap, noise) = behind_a_rupture(0.0, 9000.0);
     assert!(gap.test_free_tip(ODDS, true, &noise) && gap.tip_free && !gap.layer_confirmed);
-    assert!(gap.belief.x[K].abs() < 1e-3, "{}", gap.belief.x[K]);
-    assert!((gap.belief.x[B] / 9000.0 - 1.0).abs() < 0.02, "{}", gap.belief.x[B]);
+    assert!(gap.state.x[K].abs() < 1e-3, "{}", gap.state.x[K]);
+    assert!((gap.state.x[B] / 9000.0 - 1.0).abs() < 0.02, "{}", gap.state.x[B]);
     let (mut end, noise) = behind_a_rupture(0.0, 0.0);
     assert!(end.test_free_tip(ODDS, true, &noise) && end.tip_free);
-    assert!(end.belief.x[B].abs() < 10.0, "{}", end.belief.x[B]);
+    assert!(end.state.x[B].abs() < 10.0, "{}", end.state.x[B]);
 }
 
 #[test]
@@ -110,7 +110,7 @@ fn a_free_tip_needs_odds_of_twenty_and_four_hundred_against_the_other_case() {
         (f64::NEG_INFINITY, 10.0, false, false),
     ] {
         let (mut estimator, noise) = with_evidence(follows, ends);
-        let was = estimator.belief;
+        let was = estimator.state;
         assert_eq!(estimator.test_free_tip(ODDS, true, &noise), free, "{follows} {ends}");
         assert_eq!((estimator.tip_free, estimator.layer_confirmed), (free, settled), "{follows} {ends}");
         // Conditioned on zero stiffness and on the previous layer's friction or none.
@@ -125,8 +125,8 @@ fn a_free_tip_needs_odds_of_twenty_and_four_hundred_against_the_other_case() {
         }
         for i in 0..6 {
             let scale = was.p[i][i].sqrt();
-            assert!((estimator.belief.x[i] - expected.x[i]).abs() <= 1e-12 * expected.x[i].abs().max(scale));
-            assert!((estimator.belief.p[i][i] - expected.p[i][i]).abs() <= 1e-9 * expected.p[i][i], "{i}");
+            assert!((estimator.state.x[i] - expected.x[i]).abs() <= 1e-12 * expected.x[i].abs().max(scale));
+            assert!((estimator.state.p[i][i] - expected.p[i][i]).abs() <= 1e-9 * expected.p[i][i], "{i}");
         }
     }
 }
@@ -219,8 +219,8 @@ fn an_undetected_gap_ends_at_an_upward_bend() {
             );
             near(estimator.start_m, 0.0241);
             for i in 0..6 {
-                near(estimator.belief.x[i], expected.belief.x[i]);
-                near(estimator.belief.p[i][i], expected.belief.p[i][i]);
+                near(estimator.state.x[i], expected.state.x[i]);
+                near(estimator.state.p[i][i], expected.state.p[i][i]);
             }
         } else {
             near(estimator.start_m, undecided.start_m);
@@ -229,7 +229,7 @@ fn an_undetected_gap_ends_at_an_upward_bend() {
 }
 
 #[test]
-fn no_layer_begins_while_the_needle_stands() {
+fn no_layer_begins_while_the_needle_is_at_rest() {
     let (noise, mut passed_layers) = (noise(), PassedLayers::default());
     for free in [true, false] {
         let (mut estimator, _) = behind_a_rupture(0.0, 9000.0);
@@ -245,7 +245,7 @@ fn no_layer_begins_while_the_needle_stands() {
         assert_eq!((estimator.tip_free, estimator.start_m), (false, before.start_m));
         // Any part of the slope of 18 N/m may have been elastic.
         let part = if free { 9.0 } else { 0.0 };
-        assert!((estimator.belief.x[K] - before.belief.x[K] - part).abs() < 0.2, "{}", estimator.belief.x[K]);
+        assert!((estimator.state.x[K] - before.state.x[K] - part).abs() < 0.2, "{}", estimator.state.x[K]);
         let slope = |estimator: &LayerEstimator| estimator.slope(0.002);
         near(slope(&estimator), slope(&before));
     }
@@ -273,15 +273,15 @@ fn an_upward_bend_ends_the_gap_and_a_downward_bend_its_friction_growth() {
         let sign = if up { 1.0 } else { -1.0 };
         assert_eq!(update(&mut estimator, 0.024, 0.0), (42, false));
         assert_eq!(update(&mut estimator, 0.0241, 2.0 * sign), (42, false));
-        estimator.belief.x[K] = 77.0;
+        estimator.state.x[K] = 77.0;
         assert_eq!(update(&mut estimator, 0.0242, 9.0 * sign), (42 + 2 * 216 + 2 * 126, true));
         let (mut expected, mut expected_behind) = (before, PassedLayers::default());
         let place_m = (0.0243 - 0.0241) / 12.0_f64.sqrt();
         expected.start_after_bend(0.0241, place_m, up, 0.0021, &noise, &mut expected_behind);
         assert_eq!((estimator.tip_free, estimator.start_m), (!up, 0.0241));
         for i in 0..6 {
-            near(estimator.belief.x[i], expected.belief.x[i]);
-            near(estimator.belief.p[i][i], expected.belief.p[i][i]);
+            near(estimator.state.x[i], expected.state.x[i]);
+            near(estimator.state.p[i][i], expected.state.p[i][i]);
         }
         assert_eq!((detector.up.slow, detector.down.slow), (0.0, 0.0));
     }
@@ -290,13 +290,13 @@ fn an_upward_bend_ends_the_gap_and_a_downward_bend_its_friction_growth() {
 #[test]
 fn a_singular_covariance_has_a_finite_density() {
     let (mut estimator, noise) = behind_a_rupture(0.0, 9000.0);
-    estimator.belief =
+    estimator.state =
         crate::kalman::gaussian::Gaussian::new([0.0; 8], [1.0, 4.0, 9.0, 1.0, 1.0, 1.0, 0.0, 0.0]);
-    estimator.belief.p[B][K] = 6.0;
+    estimator.state.p[B][K] = 6.0;
     // The determinant is limited to 1e-12 of that without correlation.
     near(estimator.log_density_of_free(false, &noise), -0.5 * 36e-12_f64.ln());
-    estimator.belief.p[B][K] = -3.0;
-    (estimator.belief.x[K], estimator.belief.x[B]) = (0.7, 1.1);
+    estimator.state.p[B][K] = -3.0;
+    (estimator.state.x[K], estimator.state.x[B]) = (0.7, 1.1);
     let square = (0.49 * 9.0 + 2.0 * 0.7 * 1.1 * 3.0 + 1.21 * 4.0) / 27.0;
     near(estimator.log_density_of_free(false, &noise), -0.5 * (27.0_f64.ln() + square / noise.variance));
 }

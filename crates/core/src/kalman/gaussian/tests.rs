@@ -7,7 +7,7 @@ const MAP: Matrix = [[1.0, 0.5, -1.0], [0.3, 1.0, 2.0], [-0.7, 0.2, 1.5]];
 const DIAGONAL: [f64; 3] = [1.0, 4.0, 0.25];
 const MEAN: [f64; 3] = [1.0, -2.0, 0.5];
 
-fn belief() -> Gaussian<3> {
+fn state() -> Gaussian<3> {
     Gaussian::new(MEAN, DIAGONAL).transformed(&MAP)
 }
 
@@ -33,7 +33,7 @@ fn inverse(m: &Matrix) -> Matrix {
 
 #[test]
 fn a_linear_map_transforms_mean_and_covariance() {
-    let g = belief();
+    let g = state();
     let expected: Matrix = core::array::from_fn(|i| {
         core::array::from_fn(|j| (0..3).map(|k| MAP[i][k] * DIAGONAL[k] * MAP[j][k]).sum())
     });
@@ -54,7 +54,7 @@ fn a_linear_map_transforms_mean_and_covariance() {
 #[test]
 fn a_measurement_adds_its_information() {
     let (h, y, r) = ([2.0, 0.0, -0.5], 1.7, 0.3);
-    let before = belief();
+    let before = state();
     let innovation = before.innovation([0, 2], [h[0], h[2]], y, r);
     let spread: f64 = (0..9).map(|n| h[n / 3] * before.cov(n / 3, n % 3) * h[n % 3]).sum();
     assert!((innovation.s - (spread + r)).abs() < 1e-12);
@@ -74,11 +74,11 @@ fn a_measurement_adds_its_information() {
 #[test]
 fn adding_a_multiple_is_the_corresponding_linear_map() {
     for (i, j) in [(0, 1), (1, 0), (0, 2), (2, 0), (1, 2), (2, 1)] {
-        let mut sheared = belief();
+        let mut sheared = state();
         sheared.add_multiple(i, j, 0.8);
         let mut map: Matrix = core::array::from_fn(|a| core::array::from_fn(|b| f64::from(u8::from(a == b))));
         map[i][j] = 0.8;
-        let expected = belief().transformed(&map);
+        let expected = state().transformed(&map);
         assert_near(&full(&sheared), &full(&expected));
         assert!(sheared.x.iter().zip(expected.x).all(|(a, b)| (a - b).abs() < 1e-12));
     }
@@ -86,10 +86,10 @@ fn adding_a_multiple_is_the_corresponding_linear_map() {
 
 #[test]
 fn resetting_a_component_keeps_the_others() {
-    let mut g = belief();
+    let mut g = state();
     g.reset_component(1, 7.0, 9.0);
-    let expected = full(&belief());
-    let (x, was) = (g.x, belief().x);
+    let expected = full(&state());
+    let (x, was) = (g.x, state().x);
     assert_eq!((x[0], x[1], x[2]), (was[0], 7.0, was[2]));
     for i in 0..3 {
         for j in 0..3 {
@@ -105,7 +105,7 @@ fn resetting_a_component_keeps_the_others() {
 
 #[test]
 fn an_impossible_covariance_is_not_positive_definite() {
-    assert!(belief().is_positive_definite() && belief().is_finite());
+    assert!(state().is_positive_definite() && state().is_finite());
     // Correlations above one; pairwise possible but jointly impossible ones; a negative variance; NaN and infinity.
     let mut g = Gaussian::new([0.0; 3], [1.0, 4.0, 9.0]);
     g.p[1][0] = 1.9;
@@ -117,14 +117,14 @@ fn an_impossible_covariance_is_not_positive_definite() {
     assert!(g.is_positive_definite());
     g.p[2][1] = -0.9;
     assert!(!g.is_positive_definite());
-    let mut g = belief();
+    let mut g = state();
     g.p[2][2] = -1.0;
     assert!(!g.is_positive_definite());
     for spoil in [f64::NAN, f64::INFINITY] {
-        let mut g = belief();
+        let mut g = state();
         g.x[1] = spoil;
         assert!(!g.is_positive_definite() && !g.is_finite());
-        let mut g = belief();
+        let mut g = state();
         g.p[1][1] = spoil;
         assert!(!g.is_positive_definite() && !g.is_finite());
     }
@@ -169,7 +169,7 @@ fn variances_keep_their_lower_bounds() {
 fn large_numbers_are_finite_and_a_zero_variance_is_not_positive_definite() {
     let large = Gaussian::new([1e200; 3], [1e200; 3]);
     assert!(large.is_finite() && large.is_positive_definite());
-    let mut g = belief();
+    let mut g = state();
     (g.p[1][0], g.p[1][1], g.p[2][1]) = (0.0, 0.0, 0.0);
     assert!(!g.is_positive_definite());
     // A correlation of one within rounding is accepted.

@@ -42,10 +42,10 @@ fn near(found: f64, expected: f64, share: f64) {
 #[test]
 fn stiffness_and_friction_of_both_layers_are_recovered() {
     let (estimator, _, noise) = two();
-    near(estimator.belief.x[K], SECOND.0, 0.01);
-    near(estimator.belief.x[B], SECOND.1, 0.01);
-    near(estimator.belief.x[K_PREV], FIRST.0, 0.01);
-    near(estimator.belief.x[B_PREV], FIRST.1, 0.01);
+    near(estimator.state.x[K], SECOND.0, 0.01);
+    near(estimator.state.x[B], SECOND.1, 0.01);
+    near(estimator.state.x[K_PREV], FIRST.0, 0.01);
+    near(estimator.state.x[B_PREV], FIRST.1, 0.01);
     near(estimator.shaft_friction(0.04, &noise).0, FIRST_FRICTION, 0.01);
     near(estimator.friction_at_rupture(&noise).0, FIRST_FRICTION, 0.01);
     near(estimator.previous_thickness_m, FIRST.2, 1e-9);
@@ -74,7 +74,7 @@ fn in_a_gap_friction_keeps_growing_and_extends_the_previous_layer() {
     near(estimator.shaft_friction(0.06, &noise).0, BOTH_FRICTION + SECOND.1 * 0.008, 0.01);
     near(estimator.friction_at_rupture(&noise).0, BOTH_FRICTION, 0.01);
     // Variance of the present friction less that of the gap.
-    let g = &estimator.belief;
+    let g = &estimator.state;
     let h = [(D, 1.0), (B_PREV, -0.008)];
     let spread: f64 =
         h.iter().flat_map(|a| h.iter().map(|b| a.1 * g.cov(a.0, b.0) * b.1)).sum::<f64>() * noise.variance;
@@ -90,10 +90,10 @@ fn in_a_gap_friction_keeps_growing_and_extends_the_previous_layer() {
 #[test]
 fn an_uncertain_rupture_place_opens_the_bias_by_the_stiffness_alone() {
     let (mut estimator, mut passed_layers, noise) = two();
-    let before = estimator.belief.p[BIAS][BIAS];
+    let before = estimator.state.p[BIAS][BIAS];
     // At 0.3 m/s friction is 1500 N/m of the slope of 1620 N/m.
     estimator.rupture(SECOND.2, 1e-5, 0.3, &noise, &mut passed_layers);
-    let open_n = ((estimator.belief.p[BIAS][BIAS] - before) * noise.variance).sqrt();
+    let open_n = ((estimator.state.p[BIAS][BIAS] - before) * noise.variance).sqrt();
     near(open_n, SECOND.0 * 1e-5, 0.01);
 }
 
@@ -102,8 +102,8 @@ fn friction_at_rupture_includes_the_next_layer_over_the_uncertain_place() {
     let known = |sd_m: f64| {
         let (mut estimator, mut passed_layers, noise) = two();
         estimator.rupture(SECOND.2, sd_m, 0.002, &noise, &mut passed_layers);
-        estimator.belief.p[D][D] = 0.0;
-        (estimator.belief.p[B_PREV][D], estimator.belief.x[B]) = (0.0, 7000.0);
+        estimator.state.p[D][D] = 0.0;
+        (estimator.state.p[B_PREV][D], estimator.state.x[B]) = (0.0, 7000.0);
         estimator.friction_at_rupture(&noise).1.sqrt()
     };
     near(known(3e-5), 7000.0 * 3e-5, 1e-9);
@@ -126,19 +126,19 @@ fn a_late_layer_start_shows_in_the_bias() {
     }
     near(estimator.shaft_friction(0.07, &noise).0, at_face, 2e-3);
     // The state itself is off by b times a millimetre, 20 N s/m.
-    near(estimator.belief.x[D], at_face - b * 1e-3, 0.01);
-    let g = &estimator.belief;
+    near(estimator.state.x[D], at_face - b * 1e-3, 0.01);
+    let g = &estimator.state;
     let by = g.x[B] / g.x[K];
     let spread = g.p[D][D] + by * by * g.p[BIAS][BIAS] - 2.0 * by * g.cov(BIAS, D);
     near(estimator.shaft_friction(0.07, &noise).1, spread * noise.variance, 1e-9);
     // Limited to two standard deviations of the start, and only where the stiffness exceeds two of its own.
     let mut far = estimator;
-    far.belief.x[BIAS] -= 1.0;
-    near(far.shaft_friction(0.07, &noise).0, far.belief.x[D] + far.belief.x[B] * 1.6e-3, 1e-9);
+    far.state.x[BIAS] -= 1.0;
+    near(far.shaft_friction(0.07, &noise).0, far.state.x[D] + far.state.x[B] * 1.6e-3, 1e-9);
     let mut vague = estimator;
-    vague.belief.p[K][K] = 1.1 * 0.25 * vague.belief.x[K] * vague.belief.x[K] / noise.variance;
-    near(vague.shaft_friction(0.07, &noise).0, vague.belief.x[D], 1e-12);
-    near(vague.shaft_friction(0.07, &noise).1, vague.belief.p[D][D] * noise.variance, 1e-12);
+    vague.state.p[K][K] = 1.1 * 0.25 * vague.state.x[K] * vague.state.x[K] / noise.variance;
+    near(vague.shaft_friction(0.07, &noise).0, vague.state.x[D], 1e-12);
+    near(vague.shaft_friction(0.07, &noise).1, vague.state.p[D][D] * noise.variance, 1e-12);
 }
 
 use crate::kalman::gaussian::Gaussian;
@@ -156,8 +156,8 @@ fn correlated(passed: usize) -> (LayerEstimator, NoiseEstimator) {
             _ => 0.0,
         })
     });
-    estimator.belief = Gaussian::new([0.0; N], [1.3, 4.0, 0.25, 2.0, 0.5, 0.7, 0.0, 0.0]).transformed(&map);
-    estimator.belief.x = [130.0, 57.0, 8300.0, 44.0, 7100.0, 0.06, 0.0, 0.0];
+    estimator.state = Gaussian::new([0.0; N], [1.3, 4.0, 0.25, 2.0, 0.5, 0.7, 0.0, 0.0]).transformed(&map);
+    estimator.state.x = [130.0, 57.0, 8300.0, 44.0, 7100.0, 0.06, 0.0, 0.0];
     (estimator.start_m, estimator.previous_thickness_m, estimator.passed_count) = (0.031, 0.018, passed);
     (estimator.gap_m, estimator.gap_sd_m, estimator.previous_start_sd_m) = (0.0037, 3e-4, 5e-4);
     (estimator.slope_scale, estimator.layer_confirmed) = (90.0, true);
@@ -195,7 +195,7 @@ fn carried(map: &Matrix, x: &[f64; N], p: &Matrix) -> ([f64; N], Matrix) {
 fn at_contact_half_of_the_force_is_elastic_and_slopes_have_wide_priors() {
     let noise = NoiseEstimator::known(0.0, 1.6e-3, 0.07, 400.0);
     let estimator = LayerEstimator::at_contact(0.013, 0.7, 0.3, 1700.0, 0.0023, &noise);
-    let g = &estimator.belief;
+    let g = &estimator.state;
     assert_eq!(g.x, [0.35, 850.0, 0.5 * (1700.0 / 0.0023), 0.35 / 0.0023, 0.0, 0.07, 0.0, 0.0]);
     let sds = [0.3, 1700.0, 1700.0 / 0.0023, 0.3 / 0.0023, 0.04, 0.002];
     for (i, sd) in sds.into_iter().enumerate() {
@@ -206,9 +206,9 @@ fn at_contact_half_of_the_force_is_elastic_and_slopes_have_wide_priors() {
     let noise = NoiseEstimator::known(0.0, 1e-12, 0.0, 400.0);
     let estimator = LayerEstimator::at_contact(0.0, 0.7, 0.3, 1700.0, 0.0023, &noise);
     for (i, sd) in [(D, 0.01), (K, 10.0), (B, 10.0 / 0.0023), (K_PREV, 0.01 / 0.0023)] {
-        near((estimator.belief.p[i][i] * noise.variance).sqrt(), sd, 1e-12);
+        near((estimator.state.p[i][i] * noise.variance).sqrt(), sd, 1e-12);
     }
-    near(estimator.belief.x[K], 5.0, 1e-12);
+    near(estimator.state.x[K], 5.0, 1e-12);
 }
 
 #[test]
@@ -227,7 +227,7 @@ fn an_update_uses_the_whitened_regressor() {
         let mut before: Option<(f64, f64, f64)> = None;
         for (n, (z, u, force_n)) in samples.into_iter().enumerate() {
             let (mut h_now, mut y, mut r) = (h(z, u), force_n, 1.0);
-            let predicted: f64 = (0..N).map(|i| h_now[i] * estimator.belief.x[i]).sum();
+            let predicted: f64 = (0..N).map(|i| h_now[i] * estimator.state.x[i]).sum();
             near(estimator.predict(z, u), predicted, 1e-12);
             if rho > 0.0 && n == 1 {
                 let (z, u, force_n) = before.expect("a sample before");
@@ -238,7 +238,7 @@ fn an_update_uses_the_whitened_regressor() {
                 // Marginal noise variance of a single sample.
                 r = 1.0 / (1.0 - rho * rho);
             }
-            let (g, p) = (estimator.belief, full(&estimator.belief));
+            let (g, p) = (estimator.state, full(&estimator.state));
             let e = y - (0..N).map(|i| h_now[i] * g.x[i]).sum::<f64>();
             let s = r + spread(&p, &h_now);
             let gain: [f64; N] =
@@ -248,7 +248,7 @@ fn an_update_uses_the_whitened_regressor() {
             near(found_s, s, 1e-9);
             let x = core::array::from_fn(|i| g.x[i] + gain[i] * e);
             let left = core::array::from_fn(|i| core::array::from_fn(|j| p[i][j] - gain[i] * gain[j] * s));
-            assert_belief(&estimator.belief, &x, &left);
+            assert_belief(&estimator.state, &x, &left);
             before = Some((z, u, force_n));
             if n == 1 {
                 // After a skipped sample nothing is whitened.
@@ -265,18 +265,18 @@ fn slope_and_friction_follow_from_state_drive_and_position() {
     near(estimator.friction(0.0345), 130.0 + 8300.0 * 0.0035, 1e-12);
     near(estimator.friction_growth(0.3), 7100.0 * 0.3, 1e-12);
     near(correlated(0).0.friction(0.0345), 44.0 + 8300.0 * 0.0035, 1e-12);
-    let p = full(&estimator.belief);
+    let p = full(&estimator.state);
     near(estimator.previous_variance(&noise)[0], p[K_PREV][K_PREV] * 1.6e-3, 1e-12);
     near(estimator.previous_variance(&noise)[1], p[B_PREV][B_PREV] * 1.6e-3, 1e-12);
     let (mut falling, _) = correlated(2);
-    falling.belief.x[B_PREV] = -7100.0;
+    falling.state.x[B_PREV] = -7100.0;
     near(falling.friction_growth(0.3), 7100.0 * 0.3, 1e-12);
 }
 
 #[test]
 fn shaft_friction_grows_with_travel_while_the_tip_is_free() {
     let (mut estimator, noise) = correlated(2);
-    let p = full(&estimator.belief);
+    let p = full(&estimator.state);
     let (found, variance) = estimator.shaft_friction(0.0345, &noise);
     near(found, 130.0, 1e-12);
     near(variance, p[D][D] * 1.6e-3, 1e-12);
@@ -326,12 +326,12 @@ fn during_retraction_friction_is_shared_among_the_layers() {
     );
     // Negative friction counts as zero; without any friction there is no scaling.
     estimator.tip_free = false;
-    estimator.belief.x[B_PREV] = -3.0;
+    estimator.state.x[B_PREV] = -3.0;
     near(estimator.friction_during_retraction(&passed_layers, 0.027, 0.04, &noise), 130.0, 1e-12);
     near(estimator.friction_during_retraction(&passed_layers, 0.011, 0.04, &noise), 65.0, 1e-9);
     passed_layers[0][2] = 0.0;
     near(estimator.friction_during_retraction(&passed_layers, 0.011, 0.04, &noise), 130.0, 1e-12);
-    estimator.belief.x[D] = -4.0;
+    estimator.state.x[D] = -4.0;
     assert_eq!(estimator.friction_during_retraction(&passed_layers, 0.011, 0.04, &noise), 0.0);
     // Layers beyond the maximum enter the sum only.
     let (estimator, _) = correlated(MAX_LAYERS + 1);
@@ -379,8 +379,8 @@ fn a_rupture_transforms_the_state_and_starts_a_layer_with_a_wide_prior() {
         (-24.2, 80.0, 1.0, 1.0 / 0.3),
     ] {
         let (mut estimator, noise) = correlated(2);
-        (estimator.belief.x[K], estimator.belief.x[B]) = (k, b);
-        let (g, mut passed_layers) = (estimator.belief, PassedLayers::default());
+        (estimator.state.x[K], estimator.state.x[B]) = (k, b);
+        let (g, mut passed_layers) = (estimator.state, PassedLayers::default());
         passed_layers[1] = [0.013, 0.031, 5.0];
         let mut map = Matrix::default();
         for (i, row) in map.iter_mut().enumerate().skip(WITHOUT_BASELINE) {
@@ -390,7 +390,7 @@ fn a_rupture_transforms_the_state_and_starts_a_layer_with_a_wide_prior() {
         (map[K_PREV][K], map[B_PREV][B], map[BIAS][BIAS]) = (1.0, 1.0, 1.0);
         let (x, p) = after_a_rupture(&map, (&g, &noise), [before, stiff(&g, &noise, before)], friction);
         estimator.rupture(0.0431, 6e-4, 0.3, &noise, &mut passed_layers);
-        assert_belief(&estimator.belief, &x, &p);
+        assert_belief(&estimator.state, &x, &p);
         assert_eq!(passed_layers[1], [0.013, 0.031, 7100.0], "its estimate at the next rupture");
         near(passed_layers[2][0], 0.031, 1e-12);
         assert_eq!((passed_layers[2][1], passed_layers[2][2], passed_layers[3]), (0.0431, 0.0, [0.0; 3]));
@@ -410,8 +410,8 @@ fn a_rupture_transforms_the_state_and_starts_a_layer_with_a_wide_prior() {
 fn a_rupture_after_a_gap_resets_the_bias() {
     let (mut estimator, noise) = correlated(2);
     (estimator.start_sd_m, estimator.tip_free) = (8e-4, true);
-    (estimator.belief.x[K], estimator.belief.x[B]) = (0.0, 83.0);
-    let (mut g, mut passed_layers) = (estimator.belief, PassedLayers::default());
+    (estimator.state.x[K], estimator.state.x[B]) = (0.0, 83.0);
+    let (mut g, mut passed_layers) = (estimator.state, PassedLayers::default());
     passed_layers[1] = [0.013, 0.031, 5.0];
     let mut map = Matrix::default();
     for (i, row) in map.iter_mut().enumerate().skip(WITHOUT_BASELINE) {
@@ -430,7 +430,7 @@ fn a_rupture_after_a_gap_resets_the_bias() {
     p[BIAS][BIAS] += 1.0 / 400.0;
     // A layer has a minimal thickness.
     estimator.rupture(0.03, 6e-4, 0.3, &noise, &mut passed_layers);
-    assert_belief(&estimator.belief, &x, &p);
+    assert_belief(&estimator.state, &x, &p);
     assert_eq!((estimator.previous_start_sd_m, estimator.start_sd_m, estimator.tip_free), (8e-4, 0.0, false));
     near(estimator.previous_thickness_m, 1e-6, 1e-9);
 }
@@ -439,10 +439,10 @@ fn a_rupture_after_a_gap_resets_the_bias() {
 fn reopening_the_split_is_limited_by_the_noise() {
     for (friction, half) in [(400.0, 60.0), (1e9, 1000.0), (-1e9, -1000.0)] {
         let (mut estimator, _) = correlated(2);
-        estimator.belief = Gaussian::new([130.0, 0.0, friction, 44.0, 7100.0, 0.06, 0.0, 0.0], [1.0; N]);
+        estimator.state = Gaussian::new([130.0, 0.0, friction, 44.0, 7100.0, 0.06, 0.0, 0.0], [1.0; N]);
         estimator.reopen_split(0.3, 1e8);
-        near(estimator.belief.x[K], half, 1e-9);
-        near(estimator.belief.p[K][K], 1.0 + half * half * 1e8, 1e-9);
+        near(estimator.state.x[K], half, 1e-9);
+        near(estimator.state.p[K][K], 1.0 + half * half * 1e8, 1e-9);
     }
 }
 
@@ -452,8 +452,8 @@ fn slope_priors_are_limited_by_the_noise() {
     let noise = NoiseEstimator::known(0.0, 1e-12, 0.07, 400.0);
     estimator.rupture(0.0431, 0.0, 0.3, &noise, &mut PassedLayers::default());
     near(estimator.slope_scale, 10.0, 1e-9);
-    near((estimator.belief.p[K][K] * noise.variance).sqrt(), 10.0, 1e-9);
-    near((estimator.belief.p[B][B] * noise.variance).sqrt(), 10.0 / 0.3, 1e-9);
+    near((estimator.state.p[K][K] * noise.variance).sqrt(), 10.0, 1e-9);
+    near((estimator.state.p[B][B] * noise.variance).sqrt(), 10.0 / 0.3, 1e-9);
 }
 
 #[test]
@@ -470,9 +470,9 @@ fn the_first_layer_began_before_contact_by_force_over_slope() {
         (0.13, 0.9, -0.0023 * 83.0, 83.0, None),
     ] {
         let (mut estimator, noise) = correlated(0);
-        let x = &mut estimator.belief.x;
+        let x = &mut estimator.state.x;
         (x[D], x[K_PREV], x[K], x[B]) = (p_n, q, k, b);
-        let (mut g, mut passed_layers) = (estimator.belief, PassedLayers::default());
+        let (mut g, mut passed_layers) = (estimator.state, PassedLayers::default());
         let delta = inside_m.unwrap_or(0.0);
         if inside_m.is_some() {
             // Constraint p = K delta with the variance of the force.
@@ -494,21 +494,21 @@ fn the_first_layer_began_before_contact_by_force_over_slope() {
             g.x[B].clamp(-before / 0.3, before / 0.3),
         );
         estimator.rupture(0.0431, 6e-4, 0.3, &noise, &mut passed_layers);
-        assert_belief(&estimator.belief, &x, &p);
+        assert_belief(&estimator.state, &x, &p);
         near(estimator.previous_thickness_m, 0.0121 + delta, 1e-9);
         near(passed_layers[0][0], 0.031 - delta, 1e-9);
         assert_eq!((passed_layers[0][1], estimator.passed_count), (0.0431, 1));
     }
     // The constraint has a minimal variance.
     let (mut estimator, noise) = correlated(0);
-    estimator.belief = Gaussian::new(
+    estimator.state = Gaussian::new(
         [0.13, 57.0, 83.0, 0.9, 0.0, 0.0, 0.0, 0.0],
         [1e-9, 1e-9, 0.1, 1e-9, 0.1, 0.1, 0.0, 0.0],
     );
     let inside_m = (0.13 + 0.9 * 0.0023) / (57.0 + 83.0 * 0.0023);
     estimator.rupture(0.0431, 6e-4, 0.3, &noise, &mut PassedLayers::default());
     let kept = 57.0 + 1e-9 * inside_m * (0.13 - 57.0 * inside_m) / (1e-6 + 1e-9 + 1e-9 * inside_m * inside_m);
-    assert!((estimator.belief.x[K_PREV] - kept).abs() < 1e-13, "{} for {kept}", estimator.belief.x[K_PREV]);
+    assert!((estimator.state.x[K_PREV] - kept).abs() < 1e-13, "{} for {kept}", estimator.state.x[K_PREV]);
 }
 
 #[test]
@@ -517,8 +517,8 @@ fn an_upward_bend_starts_a_layer_and_a_downward_bend_ends_friction_growth() {
     {
         let (mut estimator, noise) = correlated(2);
         (estimator.tip_free, estimator.gap_sd_m) = (true, 3e-4);
-        (estimator.belief.x[B], estimator.belief.x[B_PREV]) = (b, 61.0);
-        let (g, mut passed_layers) = (estimator.belief, PassedLayers::default());
+        (estimator.state.x[B], estimator.state.x[B_PREV]) = (b, 61.0);
+        let (g, mut passed_layers) = (estimator.state, PassedLayers::default());
         passed_layers[1] = [0.013, 0.031, 61.0];
         let mut map: Matrix = core::array::from_fn(|i| core::array::from_fn(|j| f64::from(u8::from(i == j))));
         map[D][B] = 0.0121;
@@ -533,7 +533,7 @@ fn an_upward_bend_starts_a_layer_and_a_downward_bend_ends_friction_growth() {
             p[D][D] += (b * 6e-4).powi(2) / noise.variance;
             (x, p)
         };
-        assert_belief(&estimator.belief, &x, &p);
+        assert_belief(&estimator.state, &x, &p);
         assert_eq!((estimator.tip_free, estimator.start_m), (!up, 0.0431));
         assert_eq!(estimator.start_sd_m, if up { 6e-4 } else { 0.0 });
         // The previous layer is extended if its friction grew at more than half its rate.
@@ -547,7 +547,7 @@ fn an_upward_bend_starts_a_layer_and_a_downward_bend_ends_friction_growth() {
     }
     // A bend before the start of the layer extends nothing.
     let (mut estimator, noise) = correlated(2);
-    let before = estimator.belief.x[D];
+    let before = estimator.state.x[D];
     estimator.start_after_bend(0.03, 6e-4, false, 0.3, &noise, &mut PassedLayers::default());
-    assert_eq!((estimator.gap_m, estimator.belief.x[D]), (0.0037, before));
+    assert_eq!((estimator.gap_m, estimator.state.x[D]), (0.0037, before));
 }

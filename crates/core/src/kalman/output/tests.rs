@@ -10,7 +10,7 @@ use crate::kalman::gaussian::Gaussian;
 fn second() -> KalmanEnhancer {
     let mut stylet = inside();
     let l = &mut stylet.estimator;
-    l.belief = Gaussian::new(
+    l.state = Gaussian::new(
         [200.0, 60.0, 9000.0, 50.0, 8000.0, 0.07, 0.0, 0.0],
         [900.0, 4.0, 5.0, 6.0, 7.0, 0.5, 0.0, 0.0],
     );
@@ -59,13 +59,13 @@ fn a_layer_whose_drop_may_be_zero_is_not_reported() {
         let mut stylet = second();
         let sd = share / 1.96;
         let stiffness = (sd * sd - 6.25e-4) / 4e-4;
-        stylet.estimator.belief.p[K_PREV][K_PREV] = stiffness / (4e-4 * 1.005);
+        stylet.estimator.state.p[K_PREV][K_PREV] = stiffness / (4e-4 * 1.005);
         stylet.report_previous_layer(&sample(0.01, 1.3));
         assert_eq!(stylet.output.estimate.is_some(), reported, "{share}");
     }
     for k in [-50.0, 0.0] {
         let mut stylet = second();
-        stylet.estimator.belief.x[K_PREV] = k;
+        stylet.estimator.state.x[K_PREV] = k;
         stylet.report_previous_layer(&sample(0.01, 1.3));
         assert!(stylet.output.estimate.is_none());
     }
@@ -85,7 +85,7 @@ fn the_enhanced_force_subtracts_shaft_friction_with_its_uncertainty() {
     assert_eq!((found.output.state, found.operations), (State::NoRupture, 0));
     // Friction does not pull during insertion.
     let mut stylet = second();
-    stylet.estimator.belief.x[D] = -20.0;
+    stylet.estimator.state.x[D] = -20.0;
     assert_eq!(output_of(stylet, &at(0.002)).output.enhanced_n, 1.3);
 }
 
@@ -94,7 +94,7 @@ fn while_a_drop_continues_friction_is_limited_to_its_value_after_the_rupture() {
     for (fallen, falling, friction) in [(150.0, true, 150.0), (150.0, false, 200.0), (250.0, true, 200.0)] {
         let mut stylet = second();
         let mut then = stylet.estimator;
-        then.belief.x[D] = fallen;
+        then.state.x[D] = fallen;
         (stylet.post_rupture, stylet.drop_continues) = (Some(then), falling);
         near(output_of(stylet, &at(0.002)).output.cumulative_friction_ns_per_m, friction);
     }
@@ -213,7 +213,7 @@ fn the_complete_output_has_prediction_cusum_and_standard_deviations() {
     near(out.sd[2], 0.6);
     // An ignored sample repeats the output; in air nothing is predicted.
     stylet.output.used = false;
-    (stylet.estimator.belief.x[K], stylet.output.error_n) = (1.0, 0.5);
+    (stylet.estimator.state.x[K], stylet.output.error_n) = (1.0, 0.5);
     assert_eq!(stylet.complete_output(&sample(0.01, 1.3)).theta, [60.0, 9000.0]);
     let mut air = second();
     (air.output.used, air.in_tissue, air.output.error_n) = (true, false, 0.2);
@@ -225,8 +225,8 @@ fn the_complete_output_has_prediction_cusum_and_standard_deviations() {
 fn with_moving_baseline(mut stylet: KalmanEnhancer) -> KalmanEnhancer {
     stylet.estimator.set_baseline(&BaselineFit::default(), &stylet.noise);
     stylet.estimator.elapsed_s = 5.0;
-    stylet.estimator.belief.x[DRIFT] = 0.01;
-    stylet.estimator.belief.x[LINE] = 0.1 / 0.0099;
+    stylet.estimator.state.x[DRIFT] = 0.01;
+    stylet.estimator.state.x[LINE] = 0.1 / 0.0099;
     stylet
 }
 

@@ -18,9 +18,9 @@ fn fallen(count: f64) -> KalmanEnhancer {
 fn low() -> KalmanEnhancer {
     let mut stylet = inside();
     stylet.pre_rupture = stylet.estimator;
-    stylet.predictor.belief.x[0] = 1.2;
-    stylet.predictor.belief.p[0][0] = 0.25;
-    (stylet.predictor.belief.p[1][0], stylet.predictor.belief.p[2][0]) = (0.05, 3.0);
+    stylet.predictor.state.x[0] = 1.2;
+    stylet.predictor.state.p[0][0] = 0.25;
+    (stylet.predictor.state.p[1][0], stylet.predictor.state.p[2][0]) = (0.05, 3.0);
     stylet
 }
 
@@ -62,8 +62,8 @@ fn the_layer_after_a_long_drop_begins_at_its_onset() {
         assert!(stylet.drop_onset.is_none());
         near(stylet.estimator.start_m, began_m);
         for k in 0..6 {
-            near(stylet.estimator.belief.x[k], expected.belief.x[k]);
-            near(stylet.estimator.belief.p[k][k], expected.belief.p[k][k]);
+            near(stylet.estimator.state.x[k], expected.state.x[k]);
+            near(stylet.estimator.state.p[k][k], expected.state.p[k][k]);
         }
         near(stylet.passed_layers[0][1], began_m);
     }
@@ -180,7 +180,7 @@ fn the_size_is_the_smaller_of_both_measures_and_must_exceed_four_standard_deviat
     assert(size(&stylet), [0.25, 0.02, 0.08]);
     // Free tip: plus the growth of friction over a millimetre, 14 mN.
     let mut stylet = fallen(16.0);
-    stylet.estimator.belief.x[B_PREV] = 7000.0;
+    stylet.estimator.state.x[B_PREV] = 7000.0;
     assert(size(&stylet), [0.25, 0.005, 0.02]);
     stylet.estimator.tip_free = true;
     assert(size(&stylet), [0.25, 0.005, 0.034]);
@@ -233,7 +233,7 @@ fn restarted(local: &ForcePredictor, force_n: f64, scale_n: f64, noise: &NoiseEs
 }
 
 fn assert_same(found: &LayerEstimator, expected: &LayerEstimator) {
-    assert_eq!((found.belief.x, found.belief.p), (expected.belief.x, expected.belief.p));
+    assert_eq!((found.state.x, found.state.p), (expected.state.x, expected.state.p));
     assert_eq!((found.start_m, found.passed_count), (expected.start_m, expected.passed_count));
 }
 
@@ -252,13 +252,13 @@ fn a_continuing_drop_restarts_all_filters_at_its_level() {
         stylet.cusum.update(-3.0);
         stylet.cusum_was_zero = false;
         let mut other = stylet.estimator;
-        other.belief.x[B] = 7000.0;
+        other.state.x[B] = 7000.0;
         stylet.post_rupture = Some(other);
         let expected = restarted(&stylet.predictor, force_n, scale_n, &stylet.noise);
         stylet.continue_drop(&step(), &sample(0.01, force_n), sd);
         assert_eq!(stylet.predictor.level_n(), force_n);
         for i in 1..5 {
-            near(stylet.predictor.belief.p[i][i], expected.belief.p[i][i]);
+            near(stylet.predictor.state.p[i][i], expected.state.p[i][i]);
         }
         assert!(stylet.cusum.relative_level() == 0.0 && stylet.cusum_was_zero && stylet.candidate.is_none());
         assert_same(&stylet.estimator, &other);
@@ -286,16 +286,16 @@ fn a_rupture_is_located_half_a_step_after_the_sums_left_zero() {
         let mut stylet = fallen(3.0);
         stylet.snapshot_m = before_m;
         stylet.operations = 5;
-        stylet.snapshot.belief.x[B] = 8000.0;
+        stylet.snapshot.state.x[B] = 8000.0;
         let (mut expected, mut passed_layers) = (stylet.snapshot, stylet.passed_layers);
         expected.rupture(at_m, place_m, 0.002, &stylet.noise, &mut passed_layers);
         stylet.declare_rupture(&MotionStep { dz_m, ..step() }, &sample(0.01, 0.5), 1.3);
         let fallen = stylet.post_rupture.expect("a drop that may go on");
         near(fallen.start_m, at_m);
         for i in 0..6 {
-            near(fallen.belief.x[i], expected.belief.x[i]);
-            let off = (fallen.belief.p[i][i] - expected.belief.p[i][i]).abs();
-            assert!(off <= 1e-9 * expected.belief.p[i][i], "{before_m}: {off} of {i}");
+            near(fallen.state.x[i], expected.state.x[i]);
+            let off = (fallen.state.p[i][i] - expected.state.p[i][i]).abs();
+            assert!(off <= 1e-9 * expected.state.p[i][i], "{before_m}: {off} of {i}");
         }
         // The sample is the first of the new layer.
         let mut taken = fallen;
@@ -322,7 +322,7 @@ fn a_rupture_resets_counters_and_predictions() {
         stylet.declare_rupture(&step(), &sample(0.01, force_n), 0.0);
         assert_eq!(stylet.predictor.level_n(), force_n);
         for i in 1..5 {
-            near(stylet.predictor.belief.p[i][i], expected.belief.p[i][i]);
+            near(stylet.predictor.state.p[i][i], expected.state.p[i][i]);
         }
         assert!(stylet.cusum.relative_level() == 0.0 && stylet.cusum_was_zero && stylet.candidate.is_none());
         assert_eq!(
@@ -337,7 +337,7 @@ fn a_rupture_resets_counters_and_predictions() {
         let contact_m = stylet.estimator.start_m - stylet.estimator.previous_thickness_m;
         assert_eq!(stylet.output.contact_m, Some(contact_m));
         // The first stands.
-        stylet.rival = None;
+        stylet.zero_step_test = None;
         stylet.declare_rupture(&step(), &sample(0.02, force_n), 0.0);
         assert_eq!((stylet.output.contact_m, stylet.output.ruptures), (Some(contact_m), 2));
         near(shaft_friction_n(&stylet), (force_n - 0.07).max(0.0));
@@ -350,7 +350,7 @@ fn the_previous_layer_is_reported_again_at_the_next_rupture() {
         let mut stylet = fallen(3.0);
         (stylet.estimator.passed_count, stylet.estimator.previous_thickness_m, stylet.output.ruptures) =
             (1, 0.02, 1);
-        stylet.estimator.belief.x[K_PREV] = 50.0;
+        stylet.estimator.state.x[K_PREV] = 50.0;
         stylet.next_report_at = report_at;
         stylet.declare_rupture(&step(), &sample(0.01, 0.5), 1.3);
         assert_eq!(stylet.output.estimate.is_some(), reported);
@@ -377,16 +377,16 @@ fn a_drop_continues_below_minus_three_standard_deviations_and_ends_above_minus_t
     for (sds, since_s, falls, over) in cases {
         let mut stylet = inside();
         // In the second layer with a friction of 150 N s/m; the predictor estimates 170.
-        (stylet.estimator.passed_count, stylet.estimator.belief.x[D]) = (1, 150.0);
+        (stylet.estimator.passed_count, stylet.estimator.state.x[D]) = (1, 150.0);
         (stylet.post_rupture, stylet.time_since_rupture_s) = (Some(stylet.estimator), since_s);
         let sd = (25.0 + 0.0025_f64.powi(2) * 9e6 + 0.0045_f64.powi(2) * 4e6).sqrt() * 0.02;
-        stylet.predictor.belief.p[1][1] = 25.0;
-        stylet.predictor.belief.p[2][2] = 9e6;
-        stylet.predictor.belief.p[3][3] = 4e6;
+        stylet.predictor.state.p[1][1] = 25.0;
+        stylet.predictor.state.p[2][2] = 9e6;
+        stylet.predictor.state.p[3][3] = 4e6;
         // 0.9 mm/s above the low-passed speed (0.2 s): 4.5 mm/s².
         let moved = Sample { velocity_mps: 0.0034, ..sample(0.01, 1.0) };
-        (stylet.predictor.belief.x[2], stylet.predictor.belief.x[3]) = (30.0, 170.0);
-        stylet.predictor.belief.x[1] = sds * sd - 30.0 * 0.0025 - 20.0 * 0.0045;
+        (stylet.predictor.state.x[2], stylet.predictor.state.x[3]) = (30.0, 170.0);
+        stylet.predictor.state.x[1] = sds * sd - 30.0 * 0.0025 - 20.0 * 0.0045;
         let found = stylet.drop_is_ongoing(&MotionStep { speed_mps: 0.0025, ..step() }, &moved);
         assert_eq!((found, stylet.post_rupture.is_none()), (falls, over), "{sds} after {since_s} s");
     }

@@ -87,7 +87,7 @@ fn retraction_goes_from_the_hold_force_through_zero_to_a_pull() {
 }
 
 #[test]
-fn untracked_friction_never_pulls_more_than_the_force() {
+fn untracked_friction_never_exceeds_the_pulling_force() {
     let mut shaft = ruptured();
     shaft.update(&advancing(0.03, 3.0));
     let mut at = |x: f64, force_n: f64| {

@@ -30,7 +30,7 @@ fn friction_n(stylet: &KalmanEnhancer) -> f64 {
 
 fn uncertain() -> KalmanEnhancer {
     let mut stylet = inside();
-    stylet.snapshot.belief.p[2][2] = 1e4 / 4e-4;
+    stylet.snapshot.state.p[2][2] = 1e4 / 4e-4;
     stylet
 }
 

@@ -32,8 +32,8 @@ fn an_ordinary_sample_updates_predictor_layers_and_noise() {
     let (local, layers, noise, square) = taken(&stylet, 1.48);
     let found = after(stylet, 1.48);
     near(found.output.error_n, -0.02);
-    assert_same(&found.predictor.belief, &local.belief);
-    assert_same(&found.estimator.belief, &layers.belief);
+    assert_same(&found.predictor.state, &local.state);
+    assert_same(&found.estimator.state, &layers.state);
     assert_eq!((found.noise.variance, found.noise.rho), (noise.variance, noise.rho));
     // Prediction, and update of the layers.
     assert_eq!(found.operations, 7 + 158 + 136);
@@ -69,8 +69,8 @@ fn the_layer_estimator_feeds_the_alarm_where_it_is_valid_and_more_accurate() {
         (|s| s.speed_mps = 0.0018, -1.25),
         (|s| s.estimator.layer_confirmed = false, -1.25),
         (|s| s.estimator.start_m = 0.01005, -1.25),
-        (|s| s.estimator.belief.p[5][5] = 2.9, -0.05 / (3.9 * 4e-4_f64).sqrt()),
-        (|s| s.estimator.belief.p[5][5] = 3.1, -1.25),
+        (|s| s.estimator.state.p[5][5] = 2.9, -0.05 / (3.9 * 4e-4_f64).sqrt()),
+        (|s| s.estimator.state.p[5][5] = 3.1, -1.25),
     ];
     for (n, (change, alarm_z)) in cases.into_iter().enumerate() {
         let mut stylet = inside();
@@ -143,10 +143,10 @@ fn the_misfit_is_averaged_over_travel_and_in_a_hold_over_time() {
         (0.5, 0.002, 9.5, Some(400.0)),
     ] {
         let mut stylet = inside();
-        stylet.estimator.belief.p[5][5] = zero;
+        stylet.estimator.state.p[5][5] = zero;
         stylet.misfit = 0.3;
         // The predictor has no effect.
-        stylet.predictor.belief.x[0] = force_n;
+        stylet.predictor.state.x[0] = force_n;
         let moved = Sample { velocity_mps: v, ..sample(0.01, force_n) };
         // Keeps the noise estimate.
         stylet.noise.sample_count = 1e300;
@@ -185,7 +185,7 @@ fn a_spike_of_up_to_three_samples_is_ignored_and_a_lasting_jump_restarts_the_pre
     for force_n in [1.78, -0.06] {
         let mut stylet = inside();
         stylet.level_before_fall_n = 0.3;
-        let (texture, was) = (stylet.roughness, stylet.estimator.belief);
+        let (texture, was) = (stylet.roughness, stylet.estimator.state);
         for spikes in 1..=3 {
             let count = stylet.noise.sample_count;
             stylet = after(stylet, force_n);
@@ -194,7 +194,7 @@ fn a_spike_of_up_to_three_samples_is_ignored_and_a_lasting_jump_restarts_the_pre
                 (spikes, count, texture)
             );
             assert_eq!((stylet.predictor.level_n(), stylet.operations), (1.5, 158 * u32::from(spikes)));
-            assert_same(&stylet.estimator.belief, &was);
+            assert_same(&stylet.estimator.state, &was);
         }
         // Where the force does not follow the base law, it restarts the predictor.
         let mut rough = stylet;
@@ -203,7 +203,7 @@ fn a_spike_of_up_to_three_samples_is_ignored_and_a_lasting_jump_restarts_the_pre
         assert_eq!((found.spike_samples, found.predictor.level_n(), found.roughness), (0, force_n, texture));
         // Slope scale: the whole force less the bias over a millimetre.
         let scale_n = (force_n - 0.07_f64).abs().max(0.04);
-        let sd = (found.predictor.belief.p[2][2] * found.noise.variance).sqrt();
+        let sd = (found.predictor.state.p[2][2] * found.noise.variance).sqrt();
         assert!((sd / (scale_n / 1e-3) - 1.0).abs() < 1e-4, "{sd} N/m for {force_n} N");
         assert!(
             found.candidate.is_none()
@@ -215,7 +215,7 @@ fn a_spike_of_up_to_three_samples_is_ignored_and_a_lasting_jump_restarts_the_pre
         let step = found.output.zero_step.expect("a step of the zero");
         assert!((step.size_n - (force_n - 1.5)).abs() < 1e-9 && step.in_tissue && step.withdrawn.is_none());
         assert_eq!((found.spike_samples, found.predictor.level_n(), found.roughness), (0, 1.5, texture));
-        assert_eq!(found.estimator.belief.x, was.x);
+        assert_eq!(found.estimator.state.x, was.x);
         assert_eq!(found.baseline.subtracted_n(0.0, 0.0), step.size_n);
         // An ordinary sample ends the spike.
         assert_eq!(after(stylet, 1.5).spike_samples, 0);
@@ -226,9 +226,9 @@ fn a_spike_of_up_to_three_samples_is_ignored_and_a_lasting_jump_restarts_the_pre
     }
     // The slope scale is at least the innovation's standard deviation.
     let mut stylet = inside();
-    (stylet.predictor.belief.x[0], stylet.spike_samples) = (-0.2, 3);
+    (stylet.predictor.state.x[0], stylet.spike_samples) = (-0.2, 3);
     let found = after(stylet, 0.08);
-    let sd = (found.predictor.belief.p[2][2] * found.noise.variance).sqrt();
+    let sd = (found.predictor.state.p[2][2] * found.noise.variance).sqrt();
     assert!((sd / 40.0 - 1.0).abs() < 1e-4, "{sd} N/m");
 }
 
@@ -259,12 +259,12 @@ fn retraction_and_revisited_tissue_give_no_rupture_and_a_release_opens_its_windo
         stylet.candidate = None;
         stylet.cusum_was_zero = false;
         // An ordinary sample: during retraction the CUSUM is reset and the estimator not updated.
-        let was = stylet.estimator.belief;
+        let was = stylet.estimator.state;
         let found = after_back(stylet, position_m, v, 1.45);
         assert_eq!(found.cusum.relative_level() > 0.0, forward, "{position_m} m, {v} m/s");
         assert_eq!(found.cusum_was_zero, !forward);
         assert_eq!(found.candidate.is_some(), forward);
-        assert_eq!(found.estimator.belief.x != was.x, forward);
+        assert_eq!(found.estimator.state.x != was.x, forward);
         assert_eq!(found.operations, 158 + if forward { 136 } else { 0 });
         // An upward jump.
         let found = after_back(stylet, position_m, v, 1.8);
@@ -300,10 +300,10 @@ fn the_snapshot_is_taken_when_the_sums_leave_zero() {
             // Smallest drop.
             (stylet.misfit_weight, stylet.min_drop_n) = (0.5, 5.0);
         }
-        stylet.snapshot.belief.x[1] = 61.0;
+        stylet.snapshot.state.x[1] = 61.0;
         let found = after(stylet, force_n);
         assert_eq!(found.snapshot_m, if kept { 0.0099 } else { 0.0097 }, "{force_n} N");
-        assert_eq!(found.snapshot.belief.x[1], if kept { 60.0 } else { 61.0 });
+        assert_eq!(found.snapshot.state.x[1], if kept { 60.0 } else { 61.0 });
         assert_eq!(found.cusum_was_zero, all_zero && force_n > 1.5);
         assert_eq!(found.candidate.is_some(), force_n < 1.5);
     }
@@ -338,12 +338,12 @@ fn the_layer_estimator_waits_while_a_drop_continues() {
         let mut stylet = inside();
         (stylet.estimator.passed_count, stylet.time_since_rupture_s) = (1, 0.02);
         let mut fallen = stylet.estimator;
-        fallen.belief.x[1] = 71.0;
-        (stylet.post_rupture, stylet.predictor.belief.x[1]) = (Some(fallen), rate);
+        fallen.state.x[1] = 71.0;
+        (stylet.post_rupture, stylet.predictor.state.x[1]) = (Some(fallen), rate);
         // A force as predicted.
         let found = after(stylet, 1.5 + 0.005 * rate);
         assert_eq!(found.drop_continues, waits);
-        assert_eq!(found.estimator.belief.x[1] == 71.0, waits);
+        assert_eq!(found.estimator.state.x[1] == 71.0, waits);
     }
     // Without a rupture no drop continues.
     assert!(!after(inside(), 1.4).drop_continues);
@@ -358,7 +358,7 @@ fn a_free_tip_is_tested_after_the_end_of_a_drop() {
             (1, 103, 0.02);
         stylet.estimator.layer_confirmed = false;
         stylet.post_rupture = drop_goes_on.then_some(stylet.estimator);
-        stylet.estimator.belief = Gaussian::new([100.0, 60.0, 9000.0, 25.0, 8e3, 0.5, 0.0, 0.0], [1.0; 8]);
+        stylet.estimator.state = Gaussian::new([100.0, 60.0, 9000.0, 25.0, 8e3, 0.5, 0.0, 0.0], [1.0; 8]);
         assert_eq!(after(stylet, 1.48).operations, 158 + 136 + looked);
     }
 }
@@ -381,7 +381,7 @@ fn with_a_smoothed_log_the_decision_on_an_outlier_is_deferred() {
             (stylet.noise.sample_count, stylet.roughness)
         );
         assert_eq!(found.predictor.level_n(), 1.5);
-        assert_same(&found.estimator.belief, &stylet.estimator.belief);
+        assert_same(&found.estimator.state, &stylet.estimator.state);
         let again = after(found, force_n);
         assert!(!again.deferred && again.predictor.level_n() != 1.5);
         assert_eq!(again.output.detection.is_some(), force_n == 0.9);
@@ -412,7 +412,7 @@ fn a_sudden_change_of_speed_is_no_fall_and_keeps_the_slopes() {
     stylet.cusum.update(-3.0);
     stylet.cusum_was_zero = false;
     stylet.track_candidate(&step(), &sample(0.01, 1.3), false);
-    let (was, count) = (stylet.estimator.belief, stylet.noise.sample_count);
+    let (was, count) = (stylet.estimator.state, stylet.noise.sample_count);
     let texture = stylet.roughness;
     stylet.update_in_tissue(
         &EnhanceConfig::default(),
@@ -421,7 +421,7 @@ fn a_sudden_change_of_speed_is_no_fall_and_keeps_the_slopes() {
     );
     assert_eq!((stylet.predictor.level_n(), stylet.deepest_m, stylet.operations), (0.4, 0.01, 158));
     assert_eq!((stylet.noise.sample_count, stylet.roughness), (count, texture));
-    assert_same(&stylet.estimator.belief, &was);
+    assert_same(&stylet.estimator.state, &was);
     assert!(stylet.cusum.relative_level() == 0.0 && stylet.cusum_was_zero && stylet.candidate.is_none());
     assert!(stylet.output.detection.is_none());
 }
@@ -432,7 +432,7 @@ fn reports_come_after_twice_as_many_samples_each() {
         let mut stylet = inside();
         (stylet.estimator.passed_count, stylet.estimator.previous_thickness_m, stylet.output.ruptures) =
             (1, 0.02, 1);
-        stylet.estimator.belief = Gaussian::new([100.0, 60.0, 9000.0, 25.0, 8e3, 0.07, 0.0, 0.0], [1.0; 8]);
+        stylet.estimator.state = Gaussian::new([100.0, 60.0, 9000.0, 25.0, 8e3, 0.07, 0.0, 0.0], [1.0; 8]);
         (stylet.samples_since_rupture, stylet.next_report_at) = (since, 16);
         let found = after(stylet, 1.48);
         assert_eq!((found.output.estimate.is_some(), found.next_report_at), (reported, next));
@@ -453,8 +453,8 @@ fn only_filters_that_are_not_finite_restart() {
     let sound = restarted(|_| ());
     assert_eq!((sound.operations, sound.noise.variance), (0, 4e-4));
     assert!(sound.post_rupture.is_some());
-    assert_same(&sound.predictor.belief, &inside().predictor.belief);
-    assert_same(&sound.estimator.belief, &inside().estimator.belief);
+    assert_same(&sound.predictor.state, &inside().predictor.state);
+    assert_same(&sound.estimator.state, &inside().estimator.state);
     for (variance, kept) in
         [(f64::NAN, 2.5e-5), (f64::INFINITY, 2.5e-5), (1e12, 2.5e-5), (9e11, 9e11), (1e-13, 1e-13)]
     {
@@ -464,25 +464,25 @@ fn only_filters_that_are_not_finite_restart() {
         near(stylet.noise.variance, kept);
     }
     // Predictor: level at the force, slopes on the scale of the force less the bias.
-    let found = restarted(|s| s.predictor.belief.x[2] = f64::NAN);
+    let found = restarted(|s| s.predictor.state.x[2] = f64::NAN);
     assert_eq!((found.predictor.level_n(), found.operations), (0.4, 2 * 216 + 2 * 126 + 2 * 84));
-    near((found.predictor.belief.p[2][2] * 4e-4).sqrt(), 0.33 / 1e-3);
-    near((found.predictor.belief.p[3][3] * 4e-4).sqrt(), 0.33 / 0.002);
+    near((found.predictor.state.p[2][2] * 4e-4).sqrt(), 0.33 / 1e-3);
+    near((found.predictor.state.p[3][3] * 4e-4).sqrt(), 0.33 / 0.002);
     // Layer estimator: a contact at this position.
-    let found = restarted(|s| s.estimator.belief.x[2] = f64::NAN);
+    let found = restarted(|s| s.estimator.state.x[2] = f64::NAN);
     assert_eq!(
         (found.estimator.start_m, found.estimator.passed_count, found.operations),
         (0.01, 0, 2 * 216 + 2 * 126 + 2 * 84)
     );
-    assert!(found.post_rupture.is_none() && found.estimator.belief.is_positive_definite());
-    assert_same(&found.snapshot.belief, &found.estimator.belief);
+    assert!(found.post_rupture.is_none() && found.estimator.state.is_positive_definite());
+    assert_same(&found.snapshot.state, &found.estimator.state);
 }
 
 #[test]
 fn the_noise_is_not_learned_from_an_event() {
-    let calm = inside();
+    let steady = inside();
     let mut falling = inside();
     falling.post_rupture = Some(falling.estimator);
-    assert!(after(calm, 1.44).noise.variance != calm.noise.variance);
+    assert!(after(steady, 1.44).noise.variance != steady.noise.variance);
     assert_eq!(after(falling, 1.44).noise.variance, falling.noise.variance);
 }

@@ -151,7 +151,7 @@ fn encoder_noise_becomes_the_usual_difference() {
 }
 
 #[test]
-fn a_needle_stands_until_its_position_changes() {
+fn a_needle_is_at_rest_until_its_position_changes() {
     // The log begins to rise at sample 90, the needle moves from 100 on.
     let v = |k: usize| if k < 100 { 0.0 } else { 0.002 };
     let logged = |k: usize| (0.0001 * (k as f64 - 90.0)).clamp(0.0, 0.002);
@@ -211,42 +211,42 @@ fn positions_are_used_until_two_samples_agree_twice_as_closely() {
     // Within 40 um/s of the range between both logged velocities; within 20 during a disagreement.
     let logged = (0.002, 0.0022);
     let mut velocity = VelocityEstimator { logged_mps: 0.002, ..VelocityEstimator::default() };
-    let mut tell = |off_mps: f64, expected_mps: f64| {
+    let mut update_and_count = |off_mps: f64, expected_mps: f64| {
         (velocity.usual, velocity.logged_mps) = (0.0, 0.002);
         let (mps, disagree) = next(&mut velocity, logged, 0.0022 + off_mps);
         assert!(disagree);
         near(mps, expected_mps);
         velocity.disagreeing
     };
-    assert_eq!(tell(3.9e-5, 0.0022), 0);
-    assert_eq!(tell(4.1e-5, 0.0022 + 4.1e-5), 2);
-    assert_eq!(tell(2.1e-5, 0.0022 + 2.1e-5), 2);
-    assert_eq!(tell(1.9e-5, 0.0022 + 1.9e-5), 1);
-    assert_eq!(tell(2.1e-5, 0.0022 + 2.1e-5), 2);
-    assert_eq!(tell(1.9e-5, 0.0022 + 1.9e-5), 1);
-    assert_eq!(tell(-1e-4, 0.0022), 0);
+    assert_eq!(update_and_count(3.9e-5, 0.0022), 0);
+    assert_eq!(update_and_count(4.1e-5, 0.0022 + 4.1e-5), 2);
+    assert_eq!(update_and_count(2.1e-5, 0.0022 + 2.1e-5), 2);
+    assert_eq!(update_and_count(1.9e-5, 0.0022 + 1.9e-5), 1);
+    assert_eq!(update_and_count(2.1e-5, 0.0022 + 2.1e-5), 2);
+    assert_eq!(update_and_count(1.9e-5, 0.0022 + 1.9e-5), 1);
+    assert_eq!(update_and_count(-1e-4, 0.0022), 0);
     // Below the smaller as above the larger.
-    assert_eq!(tell(-0.0002 - 3.9e-5, 0.0022), 0);
-    assert_eq!(tell(-0.0002 - 4.1e-5, 0.002 - 4.1e-5), 2);
+    assert_eq!(update_and_count(-0.0002 - 3.9e-5, 0.0022), 0);
+    assert_eq!(update_and_count(-0.0002 - 4.1e-5, 0.002 - 4.1e-5), 2);
 }
 
 #[test]
-fn a_needle_stands_where_neither_position_nor_log_moves() {
-    for (logged, stands) in [(9e-6, true), (-9e-6, true), (1e-5, true), (1.1e-5, false), (-1.1e-5, false)] {
+fn a_needle_is_at_rest_where_neither_position_nor_logged_velocity_shows_motion() {
+    for (logged, at_rest) in [(9e-6, true), (-9e-6, true), (1e-5, true), (1.1e-5, false), (-1.1e-5, false)] {
         let mut velocity = VelocityEstimator { logged_mps: 1e-5, ..VelocityEstimator::default() };
         let (mps, disagree) = next(&mut velocity, (1e-5, logged), 0.0);
         assert_eq!(
-            (mps, disagree, velocity.standing),
-            (if stands { 0.0 } else { logged }, false, stands),
+            (mps, disagree, velocity.at_rest),
+            (if at_rest { 0.0 } else { logged }, false, at_rest),
             "{logged}"
         );
         assert_eq!(velocity.logged_mps, logged);
     }
     // It stands until the position changes, whatever the log.
-    let mut velocity = VelocityEstimator { standing: true, ..VelocityEstimator::default() };
+    let mut velocity = VelocityEstimator { at_rest: true, ..VelocityEstimator::default() };
     assert_eq!(next(&mut velocity, (0.0, 0.002), 0.0), (0.0, false));
     assert_eq!(next(&mut velocity, (0.002, 0.002), 1e-6), (0.002, true));
-    assert!(!velocity.standing && velocity.usual == 0.0);
+    assert!(!velocity.at_rest && velocity.usual == 0.0);
     // Two samples at the same time give no velocity.
     let mut velocity =
         VelocityEstimator { disagreeing: 2, logged_mps: 0.002, ..VelocityEstimator::default() };

@@ -2,7 +2,7 @@
 //!
 //! A slow reader loses lines; one that accepts nothing for long is disconnected. The online algorithm never waits for a reader.
 
-use crate::http::{Access, Closing, HttpServer, Limits, respond, with_policy};
+use crate::http::{Access, ConnectionAbortHandle, HttpServer, Limits, respond, with_policy};
 use axum::body::{Body, Bytes};
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -86,7 +86,10 @@ async fn index() -> Response {
     with_policy(respond(StatusCode::OK, "text/html; charset=utf-8", page), LIVE_POLICY)
 }
 
-async fn events(State(broadcast): State<Arc<Broadcast>>, Extension(closing): Extension<Closing>) -> Response {
+async fn events(
+    State(broadcast): State<Arc<Broadcast>>,
+    Extension(closing): Extension<ConnectionAbortHandle>,
+) -> Response {
     let (mut sender, body) = Channel::<Bytes>::new(1);
     tokio::spawn(async move {
         let subscriber = broadcast.subscribe();

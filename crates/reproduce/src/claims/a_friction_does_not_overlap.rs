@@ -1,7 +1,9 @@
 //! (a1) The friction estimates of the three isinglass phantoms do not overlap.
 
-use super::claim_definition::{Definition, GELS, KNOWN, PUBLISHED, known, protocol, published};
-use crate::effect_size::{Bar, Measured, Part, Scale};
+use super::claim_definition::{
+    Definition, GELS, KNOWN_DEPTH, PUBLISHED_TUNING, protocol, with_known_depth, with_published_tuning,
+};
+use crate::effect_size::{Criterion, ExperimentValues, Measured, Scale};
 use crate::friction_estimates::{MOTIONS, Method, PHANTOMS, estimates};
 use crate::study_conditions::View;
 
@@ -21,7 +23,7 @@ fn gaps(view: &View<'_>, methods: &[Method]) -> Measured {
             Some(lowest / highest).filter(|gap| *gap > 0.0 && gap.is_finite())
         };
         let name = format!("{} over {}", PHANTOMS[stronger].name, PHANTOMS[stronger - 1].name);
-        Part::new(name, (0..seeds).map(gap))
+        ExperimentValues::new(name, (0..seeds).map(gap))
     });
     Measured { scale: Scale::SmallestRatio, parts: parts.collect() }
 }
@@ -29,8 +31,8 @@ fn gaps(view: &View<'_>, methods: &[Method]) -> Measured {
 const BOTH: [Method; 2] = [Method::Offline, Method::Online];
 
 pub(super) fn definition() -> Definition {
-    Definition::new(protocol!("a1"), |v| gaps(v, &BOTH), Bar::Above(1.0), &GELS)
-        .also("offline alone", |v| gaps(v, &[Method::Offline]))
-        .also(KNOWN, |v| gaps(&known(v), &BOTH))
-        .also(PUBLISHED, |v| gaps(&published(v), &BOTH))
+    Definition::new(protocol!("a1"), |v| gaps(v, &BOTH), Criterion::Above(1.0), &GELS)
+        .with_sensitivity("offline alone", |v| gaps(v, &[Method::Offline]))
+        .with_sensitivity(KNOWN_DEPTH, |v| gaps(&with_known_depth(v), &BOTH))
+        .with_sensitivity(PUBLISHED_TUNING, |v| gaps(&with_published_tuning(v), &BOTH))
 }

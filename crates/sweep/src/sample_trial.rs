@@ -9,7 +9,7 @@ pub const MAX_DRAW_ATTEMPTS: u32 = 100;
 
 /// A drawn trial.
 #[derive(Clone, Debug)]
-pub struct DrawnTrial {
+pub struct SampledTrial {
     /// Number of the trial, from 0.
     pub trial: u64,
     /// Seed of its noise.
@@ -27,7 +27,7 @@ pub struct DrawnTrial {
 #[error(
     "trial {trial}: {MAX_DRAW_ATTEMPTS} consecutive draws make no valid scenario; the last: {why}; narrow the distributions"
 )]
-pub struct DrawError {
+pub struct SamplingError {
     /// Number of the trial.
     pub trial: u64,
     /// Why the last draw is invalid.
@@ -52,8 +52,8 @@ impl<'a> TrialSampler<'a> {
     /// Trial `trial`, a function of scenario, sweep, seed and trial number.
     ///
     /// # Errors
-    /// [`DrawError`] when no draw is valid.
-    pub fn draw(&self, trial: u64) -> Result<DrawnTrial, DrawError> {
+    /// [`SamplingError`] when no draw is valid.
+    pub fn draw(&self, trial: u64) -> Result<SampledTrial, SamplingError> {
         let mut point = vec![0.0; self.sweep.dimensions()];
         let mut why = String::new();
         for redrawn in 0..MAX_DRAW_ATTEMPTS {
@@ -61,12 +61,12 @@ impl<'a> TrialSampler<'a> {
             let (values, scenario) = self.scenario(trial, &point);
             match scenario {
                 Ok(scenario) => {
-                    return Ok(DrawnTrial { trial, seed: scenario.seed, redrawn, values, scenario });
+                    return Ok(SampledTrial { trial, seed: scenario.seed, redrawn, values, scenario });
                 }
                 Err(problem) => why = problem,
             }
         }
-        Err(DrawError { trial, why })
+        Err(SamplingError { trial, why })
     }
 
     fn scenario(&self, trial: u64, point: &[f64]) -> (Vec<f64>, Result<Scenario, String>) {

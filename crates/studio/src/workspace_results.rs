@@ -1,6 +1,6 @@
 //! Results of the workspace: diagnosis, plan, prediction, and how the page shows a diagnosis.
 
-use crate::job::Work;
+use crate::background_job::BackgroundJob;
 use crate::messages::*;
 use crate::phantom_view::{millimetres, title};
 use crate::sliders::{named, rounded};
@@ -15,21 +15,21 @@ use stylet_tissue::known_effect_info;
 pub const DIAGNOSIS: &str = "diagnosis";
 pub const EXTENDED: &str = "diagnosis/extended.ron";
 /// Limits of the next insertion before the user changes them; the depth is that of the phantom.
-const LIMITS_AT_FIRST: Limits =
+const DEFAULT_LIMITS: Limits =
     Limits { depth_m: 0.0, speed_mps: 0.008, acceleration_mps2: 0.1, duration_s: 90.0, force_n: 6.0 };
 
 /// A job of the studio.
-pub type Job = Work<JobResult>;
+pub type Job = BackgroundJob<JobResult>;
 
 /// A finished diagnosis.
-pub struct Diagnosed {
+pub struct FinishedDiagnosis {
     pub view: Value,
     /// Ids of the identified effects.
     pub causes: Vec<String>,
     pub extended: Scenario,
 }
 
-impl Diagnosed {
+impl FinishedDiagnosis {
     pub fn new(diagnosis: &Diagnosis, extended: Scenario) -> Self {
         let causes = diagnosis.causes.iter().map(|cause| cause.effect.clone()).collect();
         Self { view: diagnosis_view(diagnosis), causes, extended }
@@ -37,28 +37,31 @@ impl Diagnosed {
 }
 
 /// A plan.
-pub struct Planned {
+pub struct FinishedPlan {
     pub view: Value,
     pub motion: Motion,
 }
 
 /// Result of a job: the command that reproduces it, and the change of the results.
-pub type JobResult = (CommandView, Box<dyn FnOnce(&mut Explained) + Send>);
+pub type JobResult = (CommandView, Box<dyn FnOnce(&mut WorkspaceResults) + Send>);
 
 /// The results in the workspace.
 #[derive(Default)]
-pub struct Explained {
-    pub diagnosis: Option<Diagnosed>,
-    pub plan: Option<Planned>,
+pub struct WorkspaceResults {
+    pub diagnosis: Option<FinishedDiagnosis>,
+    pub plan: Option<FinishedPlan>,
     pub prediction: Option<Value>,
 }
 
-impl Explained {
+impl WorkspaceResults {
     /// The diagnosis of a workspace.
     pub fn read(workspace: &Workspace) -> Self {
         let read = || {
             let diagnosis = serde_json::from_str(&workspace.read("diagnosis/diagnosis.json")?).ok()?;
-            Some(Diagnosed::new(&diagnosis, Scenario::parse(EXTENDED, &workspace.read(EXTENDED)?).ok()?))
+            Some(FinishedDiagnosis::new(
+                &diagnosis,
+                Scenario::parse(EXTENDED, &workspace.read(EXTENDED)?).ok()?,
+            ))
         };
         Self { diagnosis: read(), ..Self::default() }
     }
@@ -143,7 +146,7 @@ fn diagnosis_view(d: &Diagnosis) -> Value {
 pub fn limits(workspace: &Workspace, phantom: &Scenario) -> LimitsView {
     let kept = workspace.read(LIMITS).and_then(|text| stylet_scenario::parse(LIMITS, &text).ok());
     let depth_m = rounded(phantom.tissue.end_m());
-    let l: Limits = kept.unwrap_or(Limits { depth_m, ..LIMITS_AT_FIRST });
+    let l: Limits = kept.unwrap_or(Limits { depth_m, ..DEFAULT_LIMITS });
     LimitsView {
         depth_mm: millimetres(l.depth_m),
         speed_mm_per_s: millimetres(l.speed_mps),

@@ -1,7 +1,7 @@
 //! Contents of a file: columns, units, findings of `stylet inspect`; corrections by the user become the column map.
 
-use crate::look::{finding, findings, size_text};
 use crate::messages::*;
+use crate::online_algorithm::{finding, findings, size_text};
 use crate::studio::{Snapshot, Studio};
 use serde_json::{Value, json};
 use std::fs::File;
@@ -15,7 +15,7 @@ use stylet_record::inspect::{
 use stylet_report::significant;
 
 /// Number of rows sampled for the small plots.
-const SKETCH_ROWS: u64 = 160;
+const PLOT_SAMPLE_ROWS: u64 = 160;
 /// Bytes that are read for one of these rows.
 const ROW_BYTES: u64 = 4096;
 /// Columns that are shown.
@@ -51,7 +51,7 @@ fn set(map: &mut ColumnMap, quantity: &str, column: Option<Column>) {
 }
 
 /// Some values of each column of a text, from evenly spaced rows; `None` for other files and for texts with other columns.
-fn sketches(path: &Path, columns: usize) -> Option<Vec<Vec<f64>>> {
+fn sample_columns(path: &Path, columns: usize) -> Option<Vec<Vec<f64>>> {
     let mut file = File::open(path).ok()?;
     let size = file.metadata().ok()?.len();
     let mut piece = |from: u64| {
@@ -64,9 +64,9 @@ fn sketches(path: &Path, columns: usize) -> Option<Vec<Vec<f64>>> {
         row.split(delimiter).map(|c| c.trim().replace(',', ".")).collect::<Vec<_>>()
     };
     let mut values = vec![Vec::new(); columns];
-    for k in 0..SKETCH_ROWS {
+    for k in 0..PLOT_SAMPLE_ROWS {
         // The first line of a piece is truncated, or is the header.
-        let text = piece(k * size / SKETCH_ROWS)?;
+        let text = piece(k * size / PLOT_SAMPLE_ROWS)?;
         let Some(row) = text.lines().nth(1) else { continue };
         let split = [';', '\t', '|', ',', ' '].map(|d| cells(row, d));
         let Some(row) = split.iter().find(|row| row.len() == columns) else { continue };
@@ -127,7 +127,7 @@ fn is_column(mapped: &Column, candidate: Option<&Candidate>, number: usize, name
 }
 
 fn columns(map: &ColumnMap, found: &Inspection, path: &Path) -> Value {
-    let sketches = sketches(path, found.columns.len());
+    let sample_columns = sample_columns(path, found.columns.len());
     let view = |c: &InspectedColumn| {
         let candidate = |quantity: &str| found.candidates.iter().find(|k| k.role.name() == quantity);
         let used = QUANTITIES.iter().find_map(|(quantity, units)| {
@@ -151,7 +151,7 @@ fn columns(map: &ColumnMap, found: &Inspection, path: &Path) -> Value {
             "flipped": used.is_some_and(|(_, _, scale, _)| scale < 0.0),
             "reason": used.and_then(|(.., candidate)| candidate).map_or("", |k| &k.reason),
             "range": c.range.map_or(String::new(), range),
-            "sketch": sketches.as_ref().and_then(|s| s.get(c.number.checked_sub(1)?)),
+            "sketch": sample_columns.as_ref().and_then(|s| s.get(c.number.checked_sub(1)?)),
         })
     };
     found.columns.iter().take(MAX_COLUMNS).map(view).collect()
@@ -214,7 +214,7 @@ pub fn set_rate(studio: &mut Studio, request: RateRequest) -> Result<Value, Prob
 }
 
 /// Resets the map to the automatic assignment.
-pub fn forget_map(studio: &mut Studio) -> Result<Value, Problem> {
+pub fn reset_map(studio: &mut Studio) -> Result<Value, Problem> {
     studio.change(Snapshot { map: None, ..studio.now.clone() }, true, true)?;
     studio.state()
 }

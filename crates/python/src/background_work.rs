@@ -20,7 +20,7 @@ pub struct ProgressCallback {
 }
 
 impl ProgressCallback {
-    /// Reports the current stage and the number of finished parts; `false` asks the work to end.
+    /// Reports the current stage and the number of finished parts; `false` requests the work to end.
     pub fn report(&self, what: &str, done: u64) -> bool {
         // A closed channel is no reason to fail.
         let _ = self.sender.send((what.to_owned(), done));

@@ -84,7 +84,7 @@ fn window(recording: &Recording, window_s: Option<[f64; 2]>) -> std::ops::Range<
     first..last.min(recording.len()).max(first)
 }
 
-pub fn look(studio: &mut Studio, request: LookRequest) -> Result<LookView, Problem> {
+pub fn recording_view(studio: &mut Studio, request: RecordingViewRequest) -> Result<RecordingView, Problem> {
     let loaded = studio.recording(&request.file)?;
     let recording = &loaded.recording;
     let mut runs = Vec::new();
@@ -109,7 +109,7 @@ pub fn look(studio: &mut Studio, request: LookRequest) -> Result<LookView, Probl
     let forces: Vec<(&'static str, &str, &[f64])> =
         columns.iter().map(|(role, name, column)| (*role, *name, column.as_slice())).collect();
     let drawn = curves(&visible, &forces, MAX_POINTS);
-    Ok(LookView {
+    Ok(RecordingView {
         summary: size_text(recording),
         findings: findings(&loaded.notes),
         samples: [visible.time_s.len(), drawn.time_s.len()],
@@ -225,11 +225,11 @@ fn layer_row(e: &LayerEstimate) -> Vec<String> {
 }
 
 /// `stylet enhance` of a recording.
-pub fn write_enhancement(studio: &mut Studio, request: LookRequest) -> Result<Value, Problem> {
+pub fn write_enhancement(studio: &mut Studio, request: RecordingViewRequest) -> Result<Value, Problem> {
     let algorithm = request.algorithms.first().map_or(ALGORITHMS[0].0, String::as_str);
     let contact_mm = request.corrections.contact_mm;
     let config = config(algorithm, contact_mm)?;
-    studio.keep()?;
+    studio.save_workspace()?;
     let workspace = &studio.workspace;
     let data = workspace.data(&request.file)?;
     let map = studio.map_file();

@@ -17,7 +17,7 @@ struct Progress<T> {
 struct Cancelled;
 
 /// Work in a thread; `T` is its result.
-pub struct Work<T> {
+pub struct BackgroundJob<T> {
     kind: &'static str,
     started: Instant,
     cancelled: Arc<AtomicBool>,
@@ -27,7 +27,7 @@ pub struct Work<T> {
     elapsed_s: f64,
 }
 
-impl<T: Send + 'static> Work<T> {
+impl<T: Send + 'static> BackgroundJob<T> {
     /// Starts work, which reports the name of each stage through the given function.
     ///
     /// # Errors

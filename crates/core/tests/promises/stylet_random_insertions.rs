@@ -1,4 +1,4 @@
-//! Promise of `algorithm: Stylet` on drawn insertions, in which tissue, motion, sensor and recording vary together: ruptures and contacts
+//! Promise of `algorithm: Stylet` on random insertions, in which tissue, motion, sensor and recording vary together: ruptures and contacts
 //! are found, the enhanced force follows the tip force, and every event and estimate is that of the table beside this file. A change of
 //! the algorithm that moves one of them shows there; `STYLET_BLESS=1` writes the table again.
 
@@ -16,7 +16,7 @@ const INSERTIONS: u64 = 36;
 const ROWS: usize = 4;
 /// Relative difference of two numbers of six digits that are rounded differently.
 const TOLERANCE: f64 = 1.1e-5;
-const TABLE: &str = "tests/promises/stylet_drawn_insertions.txt";
+const TABLE: &str = "tests/promises/stylet_random_insertions.txt";
 
 struct Draw(ChaCha8Rng);
 
@@ -46,7 +46,7 @@ impl Draw {
 }
 
 /// An insertion from 3 to 12 mm above three layers, with ripple, perhaps a hold and a retraction; forces of the law, white noise.
-fn drawn(draw: &mut Draw, seed: u64, dry_n_per_m: f64) -> (Insertion, f64) {
+fn random_insertion(draw: &mut Draw, seed: u64, dry_n_per_m: f64) -> (Insertion, f64) {
     let tissue = draw.tissue();
     let (start_m, speed_mps) = (draw.between(-0.012, -0.003), draw.between(0.002, 0.006));
     let (ripple, ripple_hz) = (draw.sometimes(0.1, 0.6), draw.between(0.1, 1.0));
@@ -120,7 +120,7 @@ fn config(draw: &mut Draw, dry_n_per_m: f64) -> EnhanceConfig {
 fn insertion(seed: u64) -> (EnhanceConfig, Insertion) {
     let mut draw = Draw(ChaCha8Rng::seed_from_u64(seed));
     let dry_n_per_m = draw.sometimes(5.0, 60.0);
-    let (mut data, turn_s) = drawn(&mut draw, seed, dry_n_per_m);
+    let (mut data, turn_s) = random_insertion(&mut draw, seed, dry_n_per_m);
     let config = config(&mut draw, dry_n_per_m);
     disturb(&mut draw, &mut data.samples, turn_s);
     (config, data)

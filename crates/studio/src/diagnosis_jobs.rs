@@ -4,9 +4,11 @@ use crate::commands;
 use crate::messages::*;
 use crate::phantom_view::{segment_text, title};
 use crate::preview::{curves, rms_text};
-use crate::results::{DIAGNOSIS, Diagnosed, EXTENDED, Explained, Job, JobResult, Planned};
 use crate::studio::Studio;
 use crate::workspace::{LIMITS, PHANTOM};
+use crate::workspace_results::{
+    DIAGNOSIS, EXTENDED, FinishedDiagnosis, FinishedPlan, Job, JobResult, WorkspaceResults,
+};
 use serde_json::{Value, json};
 use stylet_api::plan_insertion::{self, PlanReport};
 use stylet_api::prediction_files::{self, ModelOrigin};
@@ -29,7 +31,7 @@ fn inputs(studio: &mut Studio, files: &[String]) -> Result<DiagnosisInputs, Prob
     if studio.job.as_ref().is_some_and(Job::is_running) {
         return Err(Problem::new("another computation is running; wait for it or cancel it"));
     }
-    studio.keep()?;
+    studio.save_workspace()?;
     Ok(DiagnosisInputs {
         scenario: studio.workspace.path(PHANTOM),
         effects: Vec::new(),
@@ -40,7 +42,7 @@ fn inputs(studio: &mut Studio, files: &[String]) -> Result<DiagnosisInputs, Prob
 }
 
 /// Starts a job; returns its state for the page.
-fn launch(
+fn start_job(
     studio: &mut Studio,
     kind: &'static str,
     work: impl FnOnce(&dyn Fn(&str)) -> Result<JobResult, Problem> + Send + 'static,
@@ -53,7 +55,7 @@ fn launch(
 
 /// Stores the result of a job in the state.
 pub fn collect(studio: &mut Studio, (command, update): JobResult) {
-    update(&mut studio.explained);
+    update(&mut studio.results);
     // The results are complete; an unwritable journal is reported at the next change.
     let _ = studio.workspace.record(command);
 }
@@ -64,7 +66,7 @@ pub fn start_diagnosis(studio: &mut Studio, request: FilesRequest) -> Result<Val
     }
     let inputs = inputs(studio, &request.files)?;
     let folder = studio.workspace.path(DIAGNOSIS);
-    launch(studio, "diagnose", move |stage| {
+    start_job(studio, "diagnose", move |stage| {
         stage("reading the recordings");
         let assumed = inputs.load_scenario()?;
         let recordings = inputs.read_recordings()?;
@@ -72,10 +74,11 @@ pub fn start_diagnosis(studio: &mut Studio, request: FilesRequest) -> Result<Val
         let output = found.output(&assumed, &inputs)?;
         stage("writing the results");
         output.write(&folder)?;
-        let diagnosed = Diagnosed::new(&found.diagnosis, found.extended);
+        let diagnosed = FinishedDiagnosis::new(&found.diagnosis, found.extended);
         // Plan and prediction belong to the previous diagnosis.
-        let update =
-            |now: &mut Explained| *now = Explained { diagnosis: Some(diagnosed), ..Explained::default() };
+        let update = |now: &mut WorkspaceResults| {
+            *now = WorkspaceResults { diagnosis: Some(diagnosed), ..WorkspaceResults::default() }
+        };
         Ok((commands::diagnose(&inputs, &folder, &output), Box::new(update)))
     })
 }
@@ -95,13 +98,13 @@ pub fn start_plan(studio: &mut Studio, request: PlanRequest) -> Result<Value, Pr
     studio.workspace.write(LIMITS, format!("Limits{ron}\n").as_bytes())?;
     let limits_file = studio.workspace.path(LIMITS);
     let motion_file = studio.workspace.path("plan/plan.ron");
-    launch(studio, "plan", move |stage| {
+    start_job(studio, "plan", move |stage| {
         let limits = plan_insertion::load_limits(&limits_file)?;
         let report = plan_insertion::plan(&inputs, (&limits_file, &limits), false, stage)?;
         stage("writing the plan");
         report.write(&motion_file)?;
-        let planned = Planned { view: plan_view(&report), motion: report.plan.motion.clone() };
-        let update = |now: &mut Explained| now.plan = Some(planned);
+        let planned = FinishedPlan { view: plan_view(&report), motion: report.plan.motion.clone() };
+        let update = |now: &mut WorkspaceResults| now.plan = Some(planned);
         Ok((commands::plan(&inputs, &limits_file, &motion_file), Box::new(update)))
     })
 }
@@ -147,12 +150,12 @@ pub fn start_prediction(studio: &mut Studio, request: FilesRequest) -> Result<Va
         return Err(Problem::new("choose the recording of the next insertion"));
     }
     let inputs = inputs(studio, &request.files)?;
-    let model = match &studio.explained.diagnosis {
+    let model = match &studio.results.diagnosis {
         Some(_) => studio.workspace.path(EXTENDED),
         None => inputs.scenario.clone(),
     };
     let folder = studio.workspace.path(PREDICTION);
-    launch(studio, "predict", move |stage| {
+    start_job(studio, "predict", move |stage| {
         stage("reading the recordings");
         let scenario = Scenario::load(&model)?;
         let ModelOrigin { diagnosis, assumed } = ModelOrigin::of_model_file(&model, None)?;
@@ -174,7 +177,7 @@ pub fn start_prediction(studio: &mut Studio, request: FilesRequest) -> Result<Va
             "rows": rows.collect::<Value>(),
             "folder": PREDICTION,
         });
-        let update = |now: &mut Explained| now.prediction = Some(view);
+        let update = |now: &mut WorkspaceResults| now.prediction = Some(view);
         Ok((commands::predict(&model, &inputs, &folder, &output), Box::new(update)))
     })
 }
@@ -190,7 +193,7 @@ pub fn without_causes(studio: &mut Studio, request: CausesRequest) -> Result<Cau
         "error with the ruptures where the model has them: phantom {}",
         rms_text(measured_n, &assumed_n)
     );
-    let model_n = match &studio.explained.diagnosis {
+    let model_n = match &studio.results.diagnosis {
         Some(diagnosed) => {
             let switched_off = |id: &str| {
                 diagnosed.causes.iter().any(|cause| cause == id) && !request.causes.iter().any(|on| on == id)
