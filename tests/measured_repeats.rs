@@ -57,6 +57,7 @@ fn causes(json: &serde_json::Value) -> Vec<&str> {
 
 /// The only promise on sets that is short enough for continuous integration.
 #[test]
+#[ignore = "minutes; tests/measured_sets.sh runs it"]
 fn three_insertions_predict_each_other_at_the_floor() {
     let Some(folder) = measured("three_insertions_predict_each_other_at_the_floor", "needle_phantom") else {
         return;

@@ -98,11 +98,11 @@ fn mutated(seed: &[u8], random: &mut Random) -> Vec<u8> {
     out
 }
 
-/// Number of mutations and seed. The number is `default`, scaled by `STYLET_MUTATIONS` (in percent, 20 if not set) or replaced for text parsers by
+/// Number of mutations and seed. The number is `default`, scaled by `STYLET_MUTATIONS` (in percent, 10 if not set) or replaced for text parsers by
 /// `STYLET_MUTATIONS_EACH`; `STYLET_MUTATED` (`"gates shard"`) restricts the latter to some parsers.
 fn amount(name: &str, default: u64, target: Target) -> (u64, u64) {
     let set = |name: &str| std::env::var(name).ok().and_then(|x| x.parse::<u64>().ok());
-    let share = default * set("STYLET_MUTATIONS").unwrap_or(20) / 100;
+    let share = default * set("STYLET_MUTATIONS").unwrap_or(10) / 100;
     let selected =
         std::env::var("STYLET_MUTATED").map_or(true, |names| names.split_whitespace().any(|n| n == name));
     let each = set("STYLET_MUTATIONS_EACH").filter(|_| target == Target::Text && selected);
