@@ -9,7 +9,7 @@ use stylet_tissue::{ForceLaw, ForceLawState};
 fn insertion<Body: ArmBody>(scenario: &Scenario) -> Vec<(ArmStep, f64)> {
     let (Robot::Arm(config), Sensor::Both { virtual_sensor, .. }) = (&scenario.robot, &scenario.sensor)
     else {
-        panic!("an arm with a virtual sensor");
+        unreachable!("an arm with a virtual sensor");
     };
     let plan = scenario.motion.plan().expect("a motion");
     let line = config
