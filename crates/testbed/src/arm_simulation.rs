@@ -1,8 +1,8 @@
 //! One physics step of arm, controller and virtual sensor.
 
+use crate::arm_body::{ArmBody, ArmChainError};
 use crate::computed_torque_control::LineController;
-use crate::joint_space_arm::{ArmBody, JointSpaceArm};
-use crate::rapier_arm::ArmChainError;
+use crate::joint_space_arm::JointSpaceArm;
 use crate::virtual_sensor::{AxialForceObserver, JointTorqueSensors};
 use nalgebra::Vector3;
 use stylet_dynamics::feasibility;

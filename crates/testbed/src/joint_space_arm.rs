@@ -1,31 +1,11 @@
 //! The arm in joint coordinates, the body that insertions use.
 
-use crate::rapier_arm::{ArmChainError, RapierArm};
+use crate::arm_body::{ArmBody, ArmChainError};
 use nalgebra::Vector3;
 use stylet_dynamics::{Arm, EARTH_GRAVITY_MPS2, JointVector, Posture, Wrench};
 
-/// The arm as a mechanism: takes joint torques and a force at the tip, gives joint angles and rates.
-pub trait ArmBody: Sized {
-    /// The arm at given joint angles (rad) and rates (rad/s), stepped every `dt_s`.
-    ///
-    /// # Errors
-    /// [`ArmChainError`]; no checked model causes it.
-    fn new(
-        arm: &Arm<7>,
-        q_rad: &JointVector<7>,
-        qd_radps: &JointVector<7>,
-        dt_s: f64,
-    ) -> Result<Self, ArmChainError>;
-
-    /// Joint angles (rad) and rates (rad/s).
-    fn joints(&self) -> (JointVector<7>, JointVector<7>);
-
-    /// Advances by one step under joint torques (N m) and a force (N, base frame) at the tip. `at` is the arm at the present joint angles.
-    fn step(&mut self, at: &Posture<'_, 7>, torque_nm: &JointVector<7>, tip_force_n: &Vector3<f64>);
-}
-
 /// The arm in joint coordinates, integrated semi-implicitly: `qd += dt M^-1 (tau - C qd - g + J^T F)`, then `q += dt qd`. The same step as that of
-/// [`RapierArm`], but for Coriolis terms, which rapier evaluates at the end of the step; several times faster, because it shares the posture with the
+/// [`crate::RapierArm`], but for Coriolis terms, which rapier evaluates at the end of the step; several times faster, because it shares the posture with the
 /// controller and has no constraint solver.
 #[derive(Clone, Copy, Debug)]
 pub struct JointSpaceArm {
@@ -53,24 +33,5 @@ impl ArmBody for JointSpaceArm {
         self.qd_radps +=
             at.forward_dynamics(&self.qd_radps, torque_nm, &EARTH_GRAVITY_MPS2, &push) * self.dt_s;
         self.q_rad += self.qd_radps * self.dt_s;
-    }
-}
-
-impl ArmBody for RapierArm {
-    fn new(
-        arm: &Arm<7>,
-        q_rad: &JointVector<7>,
-        qd_radps: &JointVector<7>,
-        dt_s: f64,
-    ) -> Result<Self, ArmChainError> {
-        Self::new(arm, q_rad, qd_radps, dt_s)
-    }
-
-    fn joints(&self) -> (JointVector<7>, JointVector<7>) {
-        self.joints()
-    }
-
-    fn step(&mut self, at: &Posture<'_, 7>, torque_nm: &JointVector<7>, tip_force_n: &Vector3<f64>) {
-        self.step(at.link_poses(), torque_nm, &at.tip().position_m, tip_force_n);
     }
 }

@@ -1,24 +1,18 @@
-//! The arm as a rapier multibody, the reference for [`crate::JointSpaceArm`]: seven revolute joints, the links of `stylet-dynamics`, force/torque sensor and needle fixed to the last one.
+//! The arm as a rapier multibody, the reference for [`crate::JointSpaceArm`]: seven revolute joints, the links of `stylet-dynamics`, force/torque
+//! sensor and needle fixed to the last one.
 //!
 //! rapier has no input for joint torques: each is applied as a pair of opposite torques on a link and its parent. There are no colliders and no
 //! joint limits; an insertion that leaves the limits ends with [`crate::ArmError`]. rapier's default joint damping of 0.1 N m s/rad is removed. One
 //! solver iteration per step: several would be substeps with a mass matrix each. Steps are semi-implicit:
 //! `qd += dt M^-1 (tau - C qd - g + J^T F)`, then `q += dt qd`.
 
+use crate::arm_body::{ArmBody, ArmChainError};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use rapier3d_f64::prelude::*;
-use stylet_dynamics::{Arm, EARTH_GRAVITY_MPS2, JointVector, Pose as Frame, RigidBody as Body};
+use stylet_dynamics::{Arm, EARTH_GRAVITY_MPS2, JointVector, Pose as Frame, Posture, RigidBody as Body};
 
 /// Index of the free coordinate (rotation about z) of a joint among rapier's six.
 const ABOUT_Z: usize = 5;
-
-/// rapier refuses a joint of the arm.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("rapier refuses the arm's joint {joint}")]
-pub struct ArmChainError {
-    /// Counted from 1.
-    joint: usize,
-}
 
 /// The arm in its world.
 pub struct RapierArm {
@@ -30,12 +24,8 @@ pub struct RapierArm {
     last: MultibodyJointHandle,
 }
 
-impl RapierArm {
-    /// The arm at given joint angles (rad) and rates (rad/s), stepped every `dt_s`.
-    ///
-    /// # Errors
-    /// [`ArmChainError`]; no checked model causes it.
-    pub fn new(
+impl ArmBody for RapierArm {
+    fn new(
         arm: &Arm<7>,
         q_rad: &JointVector<7>,
         qd_radps: &JointVector<7>,
@@ -78,22 +68,7 @@ impl RapierArm {
         Ok(arm_body)
     }
 
-    fn place(&mut self, q_rad: &JointVector<7>, qd_radps: &JointVector<7>) {
-        let bodies = &mut self.world.bodies;
-        if let Some((chain, _)) = self.world.multibody_joints.get_mut(self.last) {
-            // Only after this does rapier treat the base as fixed and use seven coordinates.
-            chain.forward_kinematics(bodies, true);
-            chain.damping_mut().fill(0.0);
-            chain.apply_displacements(q_rad.as_slice());
-            chain.generalized_velocity_mut().copy_from_slice(qd_radps.as_slice());
-            chain.forward_kinematics(bodies, true);
-            chain.update_rigid_bodies(bodies, true);
-        }
-    }
-
-    /// Joint angles (rad) and rates (rad/s).
-    #[must_use]
-    pub fn joints(&self) -> (JointVector<7>, JointVector<7>) {
+    fn joints(&self) -> (JointVector<7>, JointVector<7>) {
         let (mut q, mut qd) = (JointVector::<7>::zeros(), JointVector::<7>::zeros());
         if let Some((chain, _)) = self.world.multibody_joints.get(self.last) {
             for (q, link) in q.iter_mut().zip(chain.links().skip(1)) {
@@ -104,16 +79,8 @@ impl RapierArm {
         (q, qd)
     }
 
-    /// Advances by one step under joint torques (N m) and a force (N) at the tip. `frames` are those
-    /// of the links at the present joint angles (`Posture::link_poses`), `tip_m` the tip's position,
-    /// all in the base frame.
-    pub fn step(
-        &mut self,
-        frames: &[Frame; 7],
-        torque_nm: &JointVector<7>,
-        tip_m: &Vector3<f64>,
-        tip_force_n: &Vector3<f64>,
-    ) {
+    fn step(&mut self, at: &Posture<'_, 7>, torque_nm: &JointVector<7>, tip_force_n: &Vector3<f64>) {
+        let (frames, tip_m) = (at.link_poses(), at.tip().position_m);
         let mut outboard = Vector3::zeros();
         for i in (0..7).rev() {
             let torque: Vector3<f64> = frames[i].rotation.column(2) * torque_nm[i];
@@ -132,6 +99,21 @@ impl RapierArm {
             outboard = torque;
         }
         self.world.step();
+    }
+}
+
+impl RapierArm {
+    fn place(&mut self, q_rad: &JointVector<7>, qd_radps: &JointVector<7>) {
+        let bodies = &mut self.world.bodies;
+        if let Some((chain, _)) = self.world.multibody_joints.get_mut(self.last) {
+            // Only after this does rapier treat the base as fixed and use seven coordinates.
+            chain.forward_kinematics(bodies, true);
+            chain.damping_mut().fill(0.0);
+            chain.apply_displacements(q_rad.as_slice());
+            chain.generalized_velocity_mut().copy_from_slice(qd_radps.as_slice());
+            chain.forward_kinematics(bodies, true);
+            chain.update_rigid_bodies(bodies, true);
+        }
     }
 
     /// Inverse of the mass matrix of the last step, 1/(kg m²).

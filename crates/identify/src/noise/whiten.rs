@@ -111,15 +111,15 @@ impl Noise {
         let mut sums = vec![0.0; w.len() + 1];
         for (k, row) in plan.rows.iter().enumerate() {
             if row.sd_n.is_finite() {
-                let (near, slow) = self.predictor(row);
+                let (ar, long_memory) = self.predictor(row);
                 let run = AR_ORDER.min(row.blocks_since_break as usize);
                 let mut x = w[k] * row.sd_n;
-                for (a, before) in near.iter().zip(e[k - run..k].iter().rev()) {
+                for (a, before) in ar.iter().zip(e[k - run..k].iter().rev()) {
                     x += a * before;
                 }
                 if plan.has_long_memory {
                     let means = stretch_means(&sums, k, row.memory_blocks as usize);
-                    x += means.iter().zip(slow).map(|(mean, slow)| slow * mean).sum::<f64>();
+                    x += means.iter().zip(long_memory).map(|(mean, a)| a * mean).sum::<f64>();
                 }
                 e[k] = x;
             }

@@ -3,7 +3,7 @@
 
 use nalgebra::{SMatrix, Vector3};
 use stylet_dynamics::{Arm, EARTH_GRAVITY_MPS2, JointVector, Wrench, panda};
-use stylet_testbed::RapierArm;
+use stylet_testbed::{ArmBody, RapierArm};
 
 /// A repeatable spread of states: additive recurrences over the inner ranges of the joints.
 fn states() -> impl Iterator<Item = (JointVector<7>, JointVector<7>, JointVector<7>, Vector3<f64>)> {
@@ -28,7 +28,7 @@ fn rapier_uses_the_mass_matrix_of_the_dynamics_crate() {
     for (q, qd, torque, push) in states() {
         let mut body = RapierArm::new(&arm, &q, &qd, 1e-3).expect("a chain");
         let at = arm.at(&q);
-        body.step(at.link_poses(), &torque, &at.tip().position_m, &push);
+        body.step(&at, &torque, &push);
         let inverse = body.inverse_mass_matrix().expect("seven coordinates");
         let identity = inverse * at.mass_matrix();
         worst = worst.max((identity - SMatrix::<f64, 7, 7>::identity()).amax());
@@ -46,7 +46,7 @@ fn rapier_gives_the_accelerations_of_the_dynamics_crate_under_torques_gravity_an
         for (q, qd, torque, push) in states() {
             let mut body = RapierArm::new(&arm, &q, &qd, dt).expect("a chain");
             let at = arm.at(&q);
-            body.step(at.link_poses(), &torque, &at.tip().position_m, &push);
+            body.step(&at, &torque, &push);
             let (q_after, qd_after) = body.joints();
             let bias = at.inverse_dynamics(
                 &qd,
@@ -72,12 +72,7 @@ fn a_supported_arm_hangs_still() {
     for _ in 0..2000 {
         let (q, _) = body.joints();
         let at = arm.at(&q);
-        body.step(
-            at.link_poses(),
-            &at.gravity_torques(&EARTH_GRAVITY_MPS2),
-            &at.tip().position_m,
-            &Vector3::zeros(),
-        );
+        body.step(&at, &at.gravity_torques(&EARTH_GRAVITY_MPS2), &Vector3::zeros());
     }
     let (q, qd) = body.joints();
     println!("after 2 s: moved {:.1e} rad, {:.1e} rad/s", (q - panda::READY_RAD).amax(), qd.amax());
