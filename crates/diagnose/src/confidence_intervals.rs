@@ -207,19 +207,9 @@ impl<'a> Covariance<'a> {
         Some((self.fit.model.get(role, 0), if half > 0.0 { half } else { by_prior() }))
     }
 
-    /// Upper end of the 95 % interval of the prior (scale of the fit) for a puncture force that the data do not bound from above; `None`
-    /// otherwise.
-    pub fn prior_upper_end(&self, role: ParameterRole) -> Option<f64> {
-        let n = self.linearization.shared.iter().find(|n| n.role == role)?;
-        is_open_above(self.fit, n).then(|| n.prior_mean + n.prior_sd * normal::quantile(UPPER_PROBABILITY))
-    }
-
-    /// Largest elastic force (N) of a layer in any recording, reduced by the 95 % range of the scatter of its puncture force.
-    pub fn reached_force_n(&self, layer: usize) -> f64 {
-        let events = self.fit.residuals.ruptures.iter().filter_map(|e| e.get(layer));
-        let reached_n = events.map(|e| e.elastic_n).fold(0.0, f64::max);
-        let scatter = self.fit.model.scatter.rupture_force;
-        reached_n * (1.0 - normal::quantile(UPPER_PROBABILITY) * scatter).max(0.0)
+    /// [`unreached_puncture`] of a puncture force; `None` for another parameter.
+    pub fn unreached_puncture(&self, role: ParameterRole) -> Option<UnreachedPuncture> {
+        unreached_puncture(self.fit, self.linearization.shared.iter().find(|n| n.role == role)?)
     }
 
     /// Paths of the parameters of an effect that are at a bound of the search.
@@ -274,6 +264,25 @@ impl<'a> Covariance<'a> {
 /// Decrease of the log likelihood (nats) at the end of a 95 % interval.
 pub(crate) fn interval_end_nats() -> f64 {
     0.5 * normal::quantile(UPPER_PROBABILITY).powi(2)
+}
+
+/// What is known of a puncture force that the data do not bound from above.
+pub(crate) struct UnreachedPuncture {
+    /// Largest elastic force (N) of the layer in any recording, reduced by the 95 % range of the scatter of its puncture force.
+    pub reached_n: f64,
+    /// Upper end of the 95 % interval of the prior, in the scale of the fit.
+    pub prior_upper_end: f64,
+}
+
+/// The limits of a puncture force that the data do not bound from above; `None` for one that they do, and for another parameter.
+pub(crate) fn unreached_puncture(fit: &Fit, n: &Parameter) -> Option<UnreachedPuncture> {
+    let ParameterRole::Puncture(layer) = n.role else { return None };
+    let events = fit.residuals.ruptures.iter().filter_map(|e| e.get(layer));
+    let scatter = 1.0 - normal::quantile(UPPER_PROBABILITY) * fit.model.scatter.rupture_force;
+    is_open_above(fit, n).then(|| UnreachedPuncture {
+        reached_n: events.map(|e| e.elastic_n).fold(0.0, f64::max) * scatter.max(0.0),
+        prior_upper_end: n.prior_mean + n.prior_sd * normal::quantile(UPPER_PROBABILITY),
+    })
 }
 
 /// Whether the data do not bound a puncture force from above, because every recording reached it only at the end of its layer.

@@ -248,16 +248,14 @@ pub(crate) fn base_parameters(covariance: &Covariance) -> Vec<BaseParameter> {
     let assumed_tissue = &covariance.fit.model.assumed.tissue;
     let mut add = |layer: usize, name: &str, role: ParameterRole, assumed: f64, scale: f64| {
         let Some((x, half)) = covariance.shared_parameter(role) else { return };
-        let open_above = covariance.prior_upper_end(role);
-        let reached_n = match role {
-            ParameterRole::Puncture(l) if open_above.is_some() => covariance.reached_force_n(l),
-            _ => f64::NEG_INFINITY,
-        };
+        let unreached = covariance.unreached_puncture(role);
+        let reached_n = unreached.as_ref().map_or(f64::NEG_INFINITY, |u| u.reached_n);
         let value = (x * scale).max(reached_n);
         // Only the surface can be negative.
         let least = if role == ParameterRole::Surface { f64::NEG_INFINITY } else { 0.0 };
         let low = ((x - half) * scale).max(reached_n).max(least);
-        let high = (open_above.map_or(x + half, |open| open.max(x + half)) * scale).max(value);
+        let high = unreached.as_ref().map_or(x + half, |u| u.prior_upper_end.max(x + half));
+        let high = (high * scale).max(value);
         out.push(BaseParameter {
             layer,
             name: name.to_owned(),
@@ -267,7 +265,7 @@ pub(crate) fn base_parameters(covariance: &Covariance) -> Vec<BaseParameter> {
             high,
             changed: assumed < low || assumed > high,
             at_bound: covariance.at_bound(role),
-            at_least: open_above.is_some(),
+            at_least: unreached.is_some(),
             out_of_tolerance: false,
         });
     };

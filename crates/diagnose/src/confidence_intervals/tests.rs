@@ -84,22 +84,20 @@ fn puncture_force_that_was_not_reached_is_open_above() {
     let role = ParameterRole::Puncture(0);
     let (model, data) = of(0.7, 0.7);
     let tied = at(&model, &data, 0.54);
-    let open = Covariance::with_known_noise(&tied, &data).prior_upper_end(role).expect("open");
-    assert!((open - 1.0 - 0.3 * 1.96).abs() < 1e-3, "{open}");
+    let open = Covariance::with_known_noise(&tied, &data).unreached_puncture(role).expect("open");
+    assert!((open.prior_upper_end - 1.0 - 0.3 * 1.96).abs() < 1e-3, "{}", open.prior_upper_end);
     let free = release_unreached_punctures(tied.clone(), &data);
     assert!((free.model.get(role, 0) - 1.0).abs() < 1e-6, "{}", free.model.get(role, 0));
     assert!(free.nats() < tied.nats() + 1.93);
     // A rupture before the end of the layer bounds the puncture force.
     let (model, data) = of(0.4, 0.4);
     let estimated = at(&model, &data, 0.4);
-    assert_eq!(Covariance::with_known_noise(&estimated, &data).prior_upper_end(role), None);
+    let covariance = Covariance::with_known_noise(&estimated, &data);
+    assert!(covariance.unreached_puncture(role).is_none());
+    assert!(covariance.unreached_puncture(ParameterRole::Stiffness(0)).is_none());
     assert_eq!(
         release_unreached_punctures(estimated.clone(), &data).model.get(role, 0),
         estimated.model.get(role, 0)
-    );
-    assert_eq!(
-        Covariance::with_known_noise(&estimated, &data).prior_upper_end(ParameterRole::Stiffness(0)),
-        None
     );
 }
 

@@ -14,8 +14,8 @@ const RUPTURE_HALF_WINDOW_S: f64 = 0.5;
 /// Names of the entries of [`PredictionScore::phase_squares`].
 pub const PHASE_NAMES: [&str; 5] = ["loading", "puncture window", "cutting", "hold", "retraction"];
 
-/// Score of a predicted force.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Score of a predicted force. The default is that of no prediction: NaN, and no samples.
+#[derive(Clone, Debug, PartialEq)]
 pub struct PredictionScore {
     /// RMS error over all samples in N.
     pub rmse_n: f64,
@@ -23,6 +23,12 @@ pub struct PredictionScore {
     pub coverage: f64,
     /// Sum of squared errors (N²) and number of samples by phase, in the order of [`PHASE_NAMES`].
     pub phase_squares: [(f64, f64); 5],
+}
+
+impl Default for PredictionScore {
+    fn default() -> Self {
+        Self { rmse_n: f64::NAN, coverage: f64::NAN, phase_squares: [(0.0, 0.0); 5] }
+    }
 }
 
 /// Scores a predicted force.
@@ -50,9 +56,10 @@ pub(crate) fn score_prediction(run: &SegmentedRecording, p: &PredictedForce) -> 
         out.phase_squares[k].0 += e * e;
         out.phase_squares[k].1 += 1.0;
     }
-    let n = r.len().max(1) as f64;
-    out.rmse_n = if p.mean_n.is_empty() { f64::NAN } else { (sum / n).sqrt() };
-    out.coverage = inside / n;
+    if !p.mean_n.is_empty() {
+        let n = r.len() as f64;
+        (out.rmse_n, out.coverage) = ((sum / n).sqrt(), inside / n);
+    }
     out
 }
 
@@ -83,7 +90,7 @@ pub(crate) fn population_without(
     Some(Population::from_fit(&refit_without(all, out, rounds)?, &training_recordings(recordings, out)))
 }
 
-/// Prediction of a held-out recording.
+/// Prediction of a held-out recording; the scores are NaN if the fit without it failed.
 #[derive(Clone, Debug, Default)]
 pub struct HeldOutPrediction {
     /// Score of the model with its empirical discrepancy.

@@ -216,7 +216,7 @@ fn diagnosis(
     let mut diagnosis = Diagnosis {
         verdict,
         causes,
-        base_parameters: base_parameters(&estimates, assumed),
+        base_parameters: base_parameters(&estimates, &best.set_fit.fit, assumed),
         not_identifiable: unidentified_effects(best, recordings),
         gain: Gain {
             held_out: true,

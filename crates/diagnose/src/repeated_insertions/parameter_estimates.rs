@@ -2,8 +2,10 @@
 
 use super::cross_validation::HeldOutPrediction;
 use super::multistart_fit::SetFit;
+use crate::confidence_intervals::unreached_puncture;
 use crate::diagnosis_json::{BaseParameter, Estimate};
 use std::collections::BTreeMap;
+use stylet_identify::fit::Fit;
 use stylet_identify::model::{Model, ParameterRole};
 use stylet_stats::{sd, student_t};
 use stylet_tissue::Tissue;
@@ -95,8 +97,18 @@ pub fn jackknife_estimates(fitted: &SetFit, out: &[HeldOutPrediction]) -> Vec<Pa
         .collect()
 }
 
-/// Base parameters among the estimates, with their assumed values.
-pub fn base_parameters(estimates: &[ParameterEstimate], assumed_tissue: &Tissue) -> Vec<BaseParameter> {
+/// Base parameters among the estimates, with their assumed values. A puncture force that no recording reached is a lower limit, as in the
+/// diagnosis of a single recording.
+pub fn base_parameters(
+    estimates: &[ParameterEstimate],
+    fit: &Fit,
+    assumed_tissue: &Tissue,
+) -> Vec<BaseParameter> {
+    let shared = fit.model.shared_parameters();
+    let unreached = |layer: usize| {
+        let n = shared.iter().find(|n| n.role == ParameterRole::Puncture(layer))?;
+        unreached_puncture(fit, n)
+    };
     estimates
         .iter()
         .filter_map(|t| {
@@ -111,16 +123,23 @@ pub fn base_parameters(estimates: &[ParameterEstimate], assumed_tissue: &Tissue)
                 "friction_ns_per_m2" => of(&|l| l.friction_ns_per_m2),
                 _ => of(&|l| l.puncture_n.unwrap_or(0.0)),
             };
+            let unreached = layer.checked_sub(1).filter(|_| t.path == "puncture_n").and_then(unreached);
+            let (mut value, mut low, mut high) = (t.value, t.low, t.high);
+            if let Some(u) = &unreached {
+                value = value.max(u.reached_n);
+                low = u.reached_n;
+                high = high.max(u.prior_upper_end * assumed).max(value);
+            }
             Some(BaseParameter {
                 layer,
                 name: t.path.clone(),
                 assumed,
-                value: t.value,
-                low: t.low,
-                high: t.high,
-                changed: !(t.low <= assumed && assumed <= t.high),
+                value,
+                low,
+                high,
+                changed: !(low <= assumed && assumed <= high),
                 at_bound: t.at_bound,
-                at_least: false,
+                at_least: unreached.is_some(),
                 out_of_tolerance: false,
             })
         })

@@ -155,3 +155,13 @@ fn a_whole_speed_is_held_out_if_there_is_another() {
     let one = [recordings[0], recordings[2]];
     assert!(leave_speed_out(&fitted, &one).is_empty());
 }
+
+/// Nothing is left to fit when the only recording is held out.
+#[test]
+fn without_a_prediction_there_is_no_score() {
+    let (recordings, fitted) = with_days(&[0.008], &[], &[]);
+    let result = leave_one_out(&fitted, &[&recordings[0]]);
+    let (model, with_discrepancy) = (&result[0].model_score, &result[0].score);
+    assert!(result[0].population.is_none());
+    assert!(model.rmse_n.is_nan() && model.coverage.is_nan() && with_discrepancy.rmse_n.is_nan());
+}

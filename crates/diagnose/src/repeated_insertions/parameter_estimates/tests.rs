@@ -8,6 +8,7 @@ use stylet_identify::fit::Fit;
 use stylet_identify::likelihood::{FitData, Residuals};
 use stylet_identify::model::{Assumptions, EffectTerm, Model, TiedParameter};
 use stylet_identify::noise::Noise;
+use stylet_identify::rupture_likelihood::RuptureEvent;
 use stylet_stats::student_t;
 use stylet_tissue::{AnyEffect, DelayedPuncture, Effect, Layer, ReleaseDepth, Tissue};
 
@@ -204,7 +205,8 @@ fn base_parameters_have_their_assumed_values() {
         .collect();
     let mut m = law.clone();
     m.effects = vec![EffectTerm::new(ReleaseDepth { layer: 1, depth_m: 1e-3 }.info(), &[1.0, 1e-3])];
-    let base = base_parameters(&jackknife_estimates(&fitted(m), &out), &tissue());
+    let set = fitted(m);
+    let base = base_parameters(&jackknife_estimates(&set, &out), &set.fit, &tissue());
     let result: Vec<(usize, &str, f64, bool)> =
         base.iter().map(|b| (b.layer, b.name.as_str(), b.assumed, b.changed)).collect();
     assert_eq!(
@@ -225,4 +227,26 @@ fn base_parameters_have_their_assumed_values() {
     let reach = student_t::quantile(0.975, 1.0) * 2.5;
     assert!((k.value - 190.0).abs() < 1e-12 && (k.high - 190.0 - reach).abs() < 1e-9, "{k:?}");
     assert!(reach > 30.0 && reach < 40.0);
+}
+
+/// The skin of 1.1 N was loaded to 0.6 N in one recording and 0.5 N in the other.
+#[test]
+fn puncture_force_that_no_recording_reached_is_a_lower_limit() {
+    let event = |elastic_n: f64, ruptured: bool| RuptureEvent {
+        force_excess: elastic_n / 1.1 - 1.0,
+        force_excess_rate: 1.0,
+        elastic_n,
+        ruptured,
+        ..RuptureEvent::INITIAL
+    };
+    let puncture = |events: [RuptureEvent; 2]| {
+        let mut set = fitted(model());
+        set.fit.residuals.ruptures = events.map(|e| vec![e]).to_vec();
+        let all = base_parameters(&jackknife_estimates(&set, &[]), &set.fit, &tissue());
+        all.into_iter().find(|b| b.name == "puncture_n").expect("a puncture force")
+    };
+    let unreached = puncture([event(0.6, false), event(0.5, false)]);
+    assert!(unreached.at_least && !unreached.changed, "{unreached:?}");
+    assert!(unreached.low > 0.4 && unreached.low <= 0.6 && unreached.high > 1.1, "{unreached:?}");
+    assert!(!puncture([event(1.1, true), event(1.1, true)]).at_least);
 }
