@@ -4,7 +4,9 @@
 //! shifts the surface, and a search from there stays in that local minimum. If one effect leaves structure, the search therefore also starts
 //! from the base law with the baseline terms whose gain exceeds their BIC penalty; the better of both searches is kept.
 
-use crate::base_law_fit::{PreparedRecordings, fit_from_prior, leaves_noise};
+use crate::base_law_fit::{
+    COARSENING_FACTOR, PreparedRecordings, coarse_refit, fit_from_prior, leaves_noise, with_noise_of,
+};
 use crate::effect_selection::{MAX_EFFECTS, Search, SearchStage};
 use crate::model_comparison::{MIN_GAIN_NATS, bic_penalty, likelihood_gain};
 use crate::model_pruning::required_gain_nats;
@@ -180,24 +182,36 @@ impl Baseline {
             BaselineEffort::Quick => 1,
             BaselineEffort::Full => MAX_EXCHANGES,
         };
+        // The steps with the exchange of one drop that fits best on coarse blocks.
+        let best_exchange = |best: &Fitted| {
+            let coarse = with_noise_of(&best.1.model, &best.2.coarsened(COARSENING_FACTOR))?;
+            let tried: Vec<(f64, Vec<Vec<ZeroStep>>)> = candidates
+                .drops
+                .iter()
+                .take(MAX_ALTERNATIVES)
+                .into_par_iter()
+                .filter_map(|drop| {
+                    let steps = toggled(&best.0.zero_steps, *drop);
+                    let with_steps = prepared.with_zero_steps(steps);
+                    let f = coarse_refit(&with_steps, &terms, (false, false), &coarse)?;
+                    let penalty =
+                        bic_penalty(f.model.effect_parameter_count(), coarse.compared_block_count());
+                    Some((f.nats() + penalty, with_steps.zero_steps))
+                })
+                .collect();
+            tried.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, steps)| steps)
+        };
         // While structure is left, a drop is tried as a step instead of a rupture, or the reverse.
         let exchanged = |mut best: Fitted| {
             for _ in 0..rounds {
                 if leaves_noise(&best.1, &best.2) {
                     break;
                 }
-                let others: Vec<(f64, Fitted)> = candidates
-                    .drops
-                    .iter()
-                    .take(MAX_ALTERNATIVES)
-                    .into_par_iter()
-                    .filter_map(|drop| fitted(toggled(&best.0.zero_steps, *drop)))
-                    .map(|other| (gain_of(&other, &best), other))
-                    .collect();
-                match others.into_iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
-                    Some((gain, other)) if gain > MIN_GAIN_NATS => best = other,
-                    _ => break,
+                let Some(other) = best_exchange(&best).and_then(fitted) else { break };
+                if gain_of(&other, &best) < MIN_GAIN_NATS {
+                    break;
                 }
+                best = other;
             }
             best
         };

@@ -38,7 +38,8 @@ const BETTER_FACTOR: f64 = 2.0;
 /// 3. D is the start that fits best with one effect ([`best_start`]). If the search from there leaves only noise out of tolerance, it is
 ///    completed and returned.
 /// 4. If the search from A ended out of tolerance and leaves only noise under weak priors, it is completed with these and returned.
-/// 5. Otherwise both are completed. The one that leaves only noise is returned; of two, the one with fewer effects (if equal: A, unless it
+/// 5. Otherwise A is completed, and D unless A then leaves only noise within tolerance and was searched first or has no more effects than D
+///    needs. The one that leaves only noise is returned; of two, the one with fewer effects (if equal: A, unless it
 ///    is out of tolerance); of none, A, unless the RMS residual of D is smaller by [`BETTER_FACTOR`].
 pub(crate) fn search_from_any_start(
     prepared: PreparedRecordings,
@@ -104,7 +105,9 @@ pub(crate) fn search_from_any_start(
     }
     let assumed = from_assumed.complete(progress);
     let Some(from_data) = from_data else { return Some(assumed) };
-    if !data_first && explains(&assumed.0) && !is_out(&assumed.0.best) {
+    // The search from the data needs at least one effect more than it has now.
+    let is_simplest = !data_first || count(&assumed.0) <= count(&from_data.search) + 1;
+    if is_simplest && explains(&assumed.0) && !is_out(&assumed.0.best) {
         return Some(assumed);
     }
     progress("searching from other numbers");
