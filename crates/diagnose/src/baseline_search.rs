@@ -99,6 +99,7 @@ impl EffectSearch {
             relax(base, data);
         }
         self.prepared.assumed = assumed;
+        self.search.is_exhausted = false;
         self
     }
 

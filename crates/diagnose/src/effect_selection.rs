@@ -57,12 +57,13 @@ impl Search {
         prepared: &PreparedRecordings,
         progress: &mut dyn FnMut(&str),
     ) {
-        while self.best.model.effects.len() < max_effects && !prepared.is_search_limit_reached() {
+        while self.best.model.effects.len() < max_effects
+            && !self.is_exhausted
+            && !prepared.is_search_limit_reached()
+        {
             let another = if self.best.model.effects.is_empty() { "an" } else { "another" };
             progress(&format!("searching for {another} effect"));
-            if !self.add_effect(prepared) {
-                return;
-            }
+            self.is_exhausted = !self.add_effect(prepared);
         }
     }
 

@@ -40,6 +40,8 @@ pub struct Search {
     pub(crate) prior_refits: usize,
     /// Frequencies (Hz) of tones in the residual.
     pub(crate) tones_hz: Vec<f64>,
+    /// Whether the last step found no effect to add to the best fit.
+    pub(crate) is_exhausted: bool,
 }
 
 impl Search {
@@ -53,6 +55,7 @@ impl Search {
             restarts: 0,
             prior_refits: 0,
             tones_hz: Vec::new(),
+            is_exhausted: false,
         }
     }
 
@@ -89,6 +92,7 @@ impl Search {
 
     /// Sets the best fit, and estimates the noise from its residual.
     pub fn accept(&mut self, f: Fit) {
+        self.is_exhausted = false;
         self.data = with_break_uncertainty(&f.model, &self.data)
             .with_estimated_noise(&f.residuals.residual_n, NoiseSource::Detrended);
         let best = fit_from_zero_scatter(&f.model, &self.data, Effort::FULL).unwrap_or(f);
