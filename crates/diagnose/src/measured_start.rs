@@ -37,7 +37,7 @@ const BETTER_FACTOR: f64 = 2.0;
 ///    tolerance, it is completed and returned.
 /// 3. D is the start that fits best with one effect ([`best_start`]). If the search from there leaves only noise out of tolerance, it is
 ///    completed and returned.
-///    A search from D with the effects of the search from A that is within tolerance is dropped: it would only repeat that from A.
+///    If both searches are within tolerance and have the same effects, D is dropped: it would repeat A.
 /// 4. If the search from A ended out of tolerance and leaves only noise under weak priors, it is completed with these and returned.
 /// 5. Otherwise A is completed, and D unless A then leaves only noise within tolerance and was searched first or has no more effects than D
 ///    needs. The one that leaves only noise is returned; of two, the one with fewer effects (if equal: A, unless it
@@ -101,7 +101,10 @@ pub(crate) fn search_from_any_start(
     // The same effects within tolerance are the same model.
     let effects =
         |found: &EffectSearch| found.search.best.model.effects.iter().map(|e| e.info.id).collect::<Vec<_>>();
-    let from_data = from_data.filter(|d| is_out(&d.search.best) || effects(d) != effects(&from_assumed));
+    let is_same = |a: &EffectSearch, b: &EffectSearch| {
+        !is_out(&a.search.best) && !is_out(&b.search.best) && effects(a) == effects(b)
+    };
+    let from_data = from_data.filter(|d| !is_same(d, &from_assumed));
     if is_out(&from_assumed.search.best) {
         let relaxed = from_assumed.clone().with_weak_priors();
         if explains(&relaxed.search) {
