@@ -1,6 +1,6 @@
 use super::{
-    Population, leave_one_out, leave_one_out_scores, leave_speed_out, population_without, refit_without,
-    repeatability_floor, score_prediction, training_recordings,
+    HeldOutPrediction, Population, leave_one_out, leave_one_out_scores, leave_speed_out, population_without,
+    refit_without, repeatability_floor, score_prediction, training_recordings,
 };
 use crate::repeated_insertions::SegmentedRecording;
 use crate::repeated_insertions::empirical_discrepancy::estimate_discrepancy;
@@ -156,12 +156,15 @@ fn a_whole_speed_is_held_out_if_there_is_another() {
     assert!(leave_speed_out(&fitted, &one).is_empty());
 }
 
-/// Nothing is left to fit when the only recording is held out.
+/// A prediction that could not be made is not one without error.
 #[test]
 fn without_a_prediction_there_is_no_score() {
-    let (recordings, fitted) = with_days(&[0.008], &[], &[]);
-    let result = leave_one_out(&fitted, &[&recordings[0]]);
-    let (model, with_discrepancy) = (&result[0].model_score, &result[0].score);
-    assert!(result[0].population.is_none());
-    assert!(model.rmse_n.is_nan() && model.coverage.is_nan() && with_discrepancy.rmse_n.is_nan());
+    let scores = [
+        score_prediction(&run("a", 1.0, 0.0), &PredictedForce::default()),
+        HeldOutPrediction::default().score,
+        HeldOutPrediction::default().model_score,
+    ];
+    for s in scores {
+        assert!(s.rmse_n.is_nan() && s.coverage.is_nan(), "{s:?}");
+    }
 }
