@@ -126,6 +126,7 @@ pub fn base_parameters(
             let unreached = layer.checked_sub(1).filter(|_| t.path == "puncture_n").and_then(unreached);
             let (mut value, mut low, mut high) = (t.value, t.low, t.high);
             if let Some(u) = &unreached {
+                // The jackknife interval is about the prior mean, which all refits share.
                 value = value.max(u.reached_n);
                 low = u.reached_n;
                 high = high.max(u.prior_upper_end * assumed).max(value);
