@@ -115,6 +115,7 @@ def verdict(diagnosis, effect="", absorbed=False):
     causes = diagnosis["causes"]
     if not causes:
         moved = [f"{p['name']} of layer {p['layer']}: {p['value']:.3g}, not {p['assumed']:.3g}" for p in diagnosis["base_parameters"] if p["out_of_tolerance"]]
+        absorbed = absorbed and diagnosis["verdict"] != "unknown"
         reasons = ["the parameters of the layers absorb it"] * absorbed + moved + [f"not identifiable: {effect}"] * (effect in diagnosis["not_identifiable"])
         return "; ".join([f"verdict: {diagnosis['verdict']}", *reasons, grade(diagnosis)])
 

@@ -173,10 +173,21 @@ pub fn fit_base_law(prepared: &PreparedRecordings) -> Option<(Fit, FitData)> {
     fit_from_prior(prepared, &[], (false, false))
 }
 
-/// Fits a model with effects from the prior on coarse blocks with few steps, so that this model determines which drops belong to layers.
+/// Fits a model with effects from the prior, so that this model determines which drops belong to layers.
 ///
 /// The base law mistakes drops that an effect produces for ruptures and shifts its layers; a fit that starts from there stays in that local
 /// minimum.
+pub(crate) fn refit_from_prior(
+    prepared: &PreparedRecordings,
+    effects: &[EffectTerm],
+    random_effects: RandomEffects,
+    data: &FitData,
+) -> Option<Fit> {
+    let (found, _) = fit_from_prior(prepared, effects, random_effects)?;
+    fit(&with_updated_times(found.model, data, &prepared.drop_times()), data, Effort::FULL)
+}
+
+/// As [`refit_from_prior`], on coarser blocks (`coarse`) and with fewer steps, to decide whether a full refit can help.
 pub(crate) fn coarse_refit(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
@@ -256,27 +267,23 @@ fn fit_with_assigned_drops(
     Some((best?, data))
 }
 
-/// Fit from the prior: assigned drops, then rounds in which noise, rupture times and parameters are updated. Only the last rounds use
-/// all blocks; those before only have to come close, and coarse blocks are enough for that.
+/// Fit from the prior: assigned drops, then rounds in which noise, rupture times and parameters are updated.
 pub(crate) fn fit_from_prior(
     prepared: &PreparedRecordings,
     effects: &[EffectTerm],
     random_effects: RandomEffects,
 ) -> Option<(Fit, FitData)> {
-    let coarse = prepared.blocks.par_iter().map(|b| b.coarsened(COARSENING_FACTOR)).collect();
-    let averaged = PreparedRecordings { blocks: Arc::new(coarse), ..prepared.clone() };
-    let (mut best, mut coarse) = fit_with_assigned_drops(&averaged, effects, random_effects)?;
+    let (mut best, mut data) = fit_with_assigned_drops(prepared, effects, random_effects)?;
     let times = prepared.drop_times();
-    for round in 0..2 {
-        coarse = coarse.with_estimated_noise(&best.residuals.residual_n, NoiseSource::Detrended);
-        let mut model = best.model;
+    for round in 0..3 {
+        data = data.with_estimated_noise(&best.residuals.residual_n, NoiseSource::Detrended);
+        let mut model = best.model.clone();
         if round == 0 && random_effects != (false, false) {
-            model = fit(&model, &coarse, COARSE_EFFORT)?.model;
+            model = fit(&model, &data, COARSE_EFFORT)?.model;
         }
-        best = fit(&with_updated_times(model, &coarse, &times), &coarse, COARSE_EFFORT)?;
+        let effort = if round == 2 { Effort::FULL } else { COARSE_EFFORT };
+        best = fit(&with_updated_times(model, &data, &times), &data, effort)?;
     }
-    let mut data = with_noise_of(&best.model, &coarse.with_recordings(prepared.blocks.to_vec()))?;
-    best = fit(&with_updated_times(best.model, &data, &times), &data, Effort::FULL)?;
     data = data.with_estimated_noise(&best.residuals.residual_n, NoiseSource::Detrended);
     best = fit_from_zero_scatter(&best.model, &data, Effort::FULL)?;
     Some((best, data))

@@ -1,13 +1,13 @@
 //! Restarts of the effect selection: refits candidates from the prior, and the current model from a candidate's parameters.
 
 use crate::base_law_fit::{
-    PreparedRecordings, coarse_refit, random_effects_of, with_noise_of, with_updated_times,
+    PreparedRecordings, coarse_refit, random_effects_of, refit_from_prior, with_noise_of,
 };
 use crate::effect_start::EffectStart;
 use crate::effect_start_values::starts_at_common_drops;
 use crate::model_comparison::MIN_GAIN_NATS;
 use crate::selection_state::Search;
-use stylet_identify::fit::{Effort, Fit, fit, fit_if_below};
+use stylet_identify::fit::{Effort, Fit, fit_if_below};
 use stylet_identify::likelihood::{FitData, residuals};
 use stylet_identify::model::EffectTerm;
 use stylet_stats::parallel::*;
@@ -57,23 +57,24 @@ impl Search {
                 )
             })
             .collect();
-        let mut coarse_fits: Vec<Fit> = tried
+        let mut coarse_fits: Vec<(f64, Vec<EffectTerm>)> = tried
             .par_iter()
-            .filter_map(|c| coarse_refit(prepared, &with(c), random_effects, &coarse))
+            .filter_map(|c| {
+                let f = coarse_refit(prepared, &with(c), random_effects, &coarse)?;
+                Some((f.nats(), f.model.effects))
+            })
             .collect();
-        coarse_fits.sort_by(|a, b| a.nats().total_cmp(&b.nats()));
+        coarse_fits.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut names: Vec<&str> = Vec::new();
-        coarse_fits.retain(|f| is_new_effect(&mut names, f));
-        let most = current - coarse_fits.first()?.nats();
+        coarse_fits.retain(|(_, effects)| effects.last().is_some_and(|e| is_new_name(&mut names, e.info.id)));
+        let most = current - coarse_fits.first()?.0;
         // Candidates further behind would not overtake the leading one.
         let reach = leader_nats + MAX_COARSE_BEHIND_SHARE * (current - leader_nats).max(0.0);
-        coarse_fits.retain(|f| current - f.nats() > MAX_BEHIND_SHARE * most && f.nats() < reach);
+        coarse_fits.retain(|s| current - s.0 > MAX_BEHIND_SHARE * most && s.0 < reach);
         coarse_fits.truncate(MAX_PRIOR_REFITS);
-        let times = prepared.drop_times();
         let mut started: Vec<Fit> = Vec::new();
-        for coarse_fit in coarse_fits {
-            let model = with_updated_times(coarse_fit.model, &self.data, &times);
-            let Some(f) = fit(&model, &self.data, Effort::FULL) else { continue };
+        for (_, effects) in coarse_fits {
+            let Some(f) = refit_from_prior(prepared, &effects, random_effects, &self.data) else { continue };
             let leaves_noise = self.leaves_noise(&f);
             started.push(f);
             if leaves_noise {
@@ -106,7 +107,10 @@ impl Search {
 
 /// Whether the last effect of a fit is not in `names` yet; adds it.
 pub(crate) fn is_new_effect(names: &mut Vec<&'static str>, f: &Fit) -> bool {
-    let name = f.model.effects.last().map_or("", |e| e.info.id);
+    is_new_name(names, f.model.effects.last().map_or("", |e| e.info.id))
+}
+
+fn is_new_name(names: &mut Vec<&'static str>, name: &'static str) -> bool {
     let new = !names.contains(&name);
     names.push(name);
     new

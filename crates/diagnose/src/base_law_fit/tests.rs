@@ -74,12 +74,17 @@ fn base_law_is_identified_from_the_prior() {
 }
 
 #[test]
-fn a_coarse_refit_recovers_the_strength_of_an_effect() {
+fn full_and_coarse_refits_recover_the_strength_of_an_effect() {
     let (prepared, data) = prepared_gel(60.0);
-    let coarse = data.coarsened(COARSENING_FACTOR);
-    let fitted = coarse_refit(&prepared, &[dry_friction()], NO_RANDOM_EFFECTS, &coarse).expect("a fit");
-    let fitted = fitted.model.effects[0].values[0];
-    assert!((fitted / 60.0 - 1.0).abs() < 0.2, "{fitted}");
+    let strength = |f: Option<Fit>| f.expect("a fit").model.effects[0].values[0];
+    let coarse = data.with_recordings(data.recordings.iter().map(|b| b.coarsened(3)).collect());
+    for fitted in [
+        refit_from_prior(&prepared, &[dry_friction()], NO_RANDOM_EFFECTS, &data),
+        coarse_refit(&prepared, &[dry_friction()], NO_RANDOM_EFFECTS, &coarse),
+    ] {
+        let fitted = strength(fitted);
+        assert!((fitted / 60.0 - 1.0).abs() < 0.2, "{fitted}");
+    }
 }
 
 #[test]
