@@ -98,7 +98,7 @@ pub(crate) fn search_from_any_start(
     if data_first && is_final(&from_assumed) {
         return Some(from_assumed.complete(progress));
     }
-    // Two searches at the same effects, with all parameters within tolerance, would go on alike.
+    // Two searches at the same effects, with all parameters within tolerance, would give the same result.
     let effects =
         |found: &EffectSearch| found.search.best.model.effects.iter().map(|e| e.info.id).collect::<Vec<_>>();
     let is_same = |a: &EffectSearch, b: &EffectSearch| {
