@@ -6,14 +6,12 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Mutex;
-use stylet_diagnose::diagnosis_json::{Diagnosis, Verdict};
+use stylet_diagnose::diagnosis_json::Diagnosis;
 
 /// Relative tolerance: what a reader of three digits notices.
 const RELATIVE_TOLERANCE: f64 = 1e-2;
 /// Smaller numbers count as zero.
 const ZERO: f64 = 1e-9;
-/// A surface (m) this close to the assumed zero is at zero: its relative error means nothing.
-const SURFACE_ZERO_M: f64 = 1e-5;
 
 /// Serialises writing.
 static FILE: Mutex<()> = Mutex::new(());
@@ -39,7 +37,7 @@ impl AnswerLines {
         self.0.push(format!("{path} {}", all.join(" ")));
     }
 
-    /// Verdict, effects and parameters of a diagnosis. Beside an unmodelled force, only verdict and effects: the parameters depend on it.
+    /// Verdict, effects and parameters of a diagnosis.
     pub fn diagnosis(&mut self, found: &Diagnosis) {
         self.words("verdict", &format!("{:?}", found.verdict).to_lowercase());
         for cause in &found.causes {
@@ -48,15 +46,9 @@ impl AnswerLines {
                 self.number(&format!("{}.{path}", cause.effect), estimate.value);
             }
         }
-        if found.verdict == Verdict::Unknown {
-            return;
-        }
         found.negligible.iter().for_each(|n| self.words("negligible", &n.effect));
         for b in &found.base_parameters {
-            let is_at_zero = b.name == "surface_m" && b.value.abs() < SURFACE_ZERO_M;
-            if !is_at_zero {
-                self.number(&format!("layer {}.{}", b.layer, b.name), b.value);
-            }
+            self.number(&format!("layer {}.{}", b.layer, b.name), b.value);
         }
     }
 
